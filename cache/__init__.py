@@ -1,0 +1,53 @@
+"""The store of results: never wrong, never half-written. It knows nothing of what the results mean.
+
+>>> import tempfile, numpy as np
+>>> from pathlib import Path
+>>> folder = tempfile.TemporaryDirectory()
+>>> store = Store(Path(folder.name))
+>>> recipe = Recipe("square", code={"squares": "1f"}, params={"n": 3}, inputs={}, environment={})
+>>> with store.begin(recipe, {"product": "square"}) as draft:
+...     draft.create_array("square", (3,), "int64", chunks=(3,), dims=("n",), attrs={"units": "1"})
+...     draft.write("square", (slice(0, 3),), np.array([0, 1, 4]))
+>>> store.open(recipe.key)["square"].values
+array([0, 1, 4])
+"""
+
+from cache.code import code_hash, code_parts
+from cache.draft import Draft
+from cache.entry import Entry
+from cache.errors import (
+    CacheError,
+    CacheUnavailable,
+    DamagedEntry,
+    EntryNotFound,
+    IncompleteDraft,
+    InvalidArray,
+    InvalidKey,
+    InvalidRecipe,
+    NonDeterministicStage,
+    SourceNotFound,
+)
+from cache.key import ABSENT, Change, Recipe, differences
+from cache.store import Store
+
+__all__ = [
+    "ABSENT",
+    "CacheError",
+    "CacheUnavailable",
+    "Change",
+    "DamagedEntry",
+    "Draft",
+    "Entry",
+    "EntryNotFound",
+    "IncompleteDraft",
+    "InvalidArray",
+    "InvalidKey",
+    "InvalidRecipe",
+    "NonDeterministicStage",
+    "Recipe",
+    "SourceNotFound",
+    "Store",
+    "code_hash",
+    "code_parts",
+    "differences",
+]

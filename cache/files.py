@@ -1,0 +1,143 @@
+"""Files that survive a crash, a kill and a full disk."""
+
+import errno
+import hashlib
+import os
+import shutil
+import stat
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TypeVar
+
+from cache.errors import CacheError, CacheUnavailable
+
+T = TypeVar("T")
+R = TypeVar("R")
+THREADS = 4
+"""Threads that read, hash and sync: enough to hide the disk's latency."""
+
+_ADVICE = {
+    errno.ENOSPC: "free some space, or choose another cache folder",
+    errno.EDQUOT: "free some space, or choose another cache folder",
+    errno.EFBIG: "raise the limit on the size of files, or choose another cache folder",
+    errno.EROFS: "choose a cache folder that can be written",
+    errno.ENOTDIR: "something there is a file: choose another cache folder",
+    errno.EEXIST: "something there is a file: choose another cache folder",
+}
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn a failure of the file system under ``path`` into ``CacheUnavailable``, one line with advice."""
+    with _explaining(path, "write to"):
+        yield
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Turn a failure of the file system under ``path`` into ``CacheUnavailable``, one line with advice."""
+    with _explaining(path, "read"):
+        yield
+
+
+@contextmanager
+def _explaining(path: Path, action: str) -> Iterator[None]:
+    try:
+        yield
+    except CacheError:
+        raise
+    except OSError as error:
+        advice = _ADVICE.get(error.errno or 0, "check its permissions, or choose another cache folder")
+        raise CacheUnavailable(f"cannot {action} the cache at {path}: {error.strerror or error}; {advice}") from error
+
+
+def in_threads(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
+    """Return ``function`` of each item, in order, worked out by a few threads.
+
+    All threads have ended when this returns or raises, so that nothing is written afterwards.
+    """
+    with ThreadPoolExecutor(THREADS) as pool:
+        return list(pool.map(function, items))
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder and its parents; each new name is on disk before this returns."""
+    missing = [folder for folder in (path, *path.parents) if not folder.is_dir()]
+    for folder in reversed(missing):
+        folder.mkdir(exist_ok=True)
+        sync(folder.parent)
+
+
+def sync(path: Path) -> None:
+    """Have the file, or the names in the folder, on disk before this returns."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def write_synced(path: Path, data: bytes) -> None:
+    """Write a new read-only file whose content is on disk before this returns."""
+    with path.open("xb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    make_read_only(path)
+
+
+def hash_file(path: Path) -> str:
+    """Return the sha256 of a file's bytes, in hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def make_read_only(path: Path) -> None:
+    """Take away everybody's right to write."""
+    path.chmod(stat.S_IMODE(path.stat().st_mode) & ~0o222)
+
+
+def walk(folder: Path, prefix: str = "") -> Iterator[tuple[str, os.DirEntry[str]]]:
+    """Yield all that is below ``folder``, each with its path relative to it; links are not followed."""
+    with os.scandir(folder / prefix) as things:
+        for thing in things:
+            yield f"{prefix}{thing.name}", thing
+            if thing.is_dir(follow_symlinks=False):
+                yield from walk(folder, f"{prefix}{thing.name}/")
+
+
+def walk_folders(folder: Path) -> Iterator[Path]:
+    """Yield ``folder`` and the folders below it, inner ones first; links are not followed."""
+    with os.scandir(folder) as things:
+        inner = [Path(thing.path) for thing in things if thing.is_dir(follow_symlinks=False)]
+    for each in inner:
+        yield from walk_folders(each)
+    yield folder
+
+
+def move_folder(source: Path, target: Path) -> None:
+    """Rename a folder to a new name; it is made writable, since its ``..`` changes."""
+    source.chmod(stat.S_IMODE(source.lstat().st_mode) | 0o700)
+    source.rename(target)
+
+
+def remove(path: Path) -> None:
+    """Delete a file or folder, read-only or not, as far as that is possible."""
+    if path.is_symlink() or not path.is_dir():
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+        return
+    with suppress(OSError):
+        _unlock_folders(path)
+    shutil.rmtree(path, ignore_errors=True)
+
+
+def _unlock_folders(path: Path) -> None:
+    """Make a folder and those below it writable, outer ones first."""
+    path.chmod(0o700)
+    with os.scandir(path) as things:
+        inner = [Path(thing.path) for thing in things if thing.is_dir(follow_symlinks=False)]
+    for each in inner:
+        _unlock_folders(each)

@@ -1,0 +1,169 @@
+"""The cache as its users see it: find, require, open, begin."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import time
+from typing import TYPE_CHECKING
+
+from cache import publish
+from cache.check import Finding, Policy, inspect, read_record
+from cache.document import plain_mapping
+from cache.draft import Draft
+from cache.entry import Entry
+from cache.errors import DamagedEntry, EntryNotFound
+from cache.files import make_folder, remove, writing
+from cache.key import Recipe, require_texts
+from cache.layout import Layout
+from cache.locks import held
+from cache.owner import is_abandoned
+from cache.quarantine import set_aside_if_damaged
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True, init=False)
+class Store:
+    """A folder of published results, by key.
+
+    Many processes and threads can use one folder at a time. A ``Store`` itself holds nothing but
+    the path and the policy, and can be sent to other processes.
+
+    Attributes:
+        root: the folder, absolute; made on the first write.
+        verify: how much of an entry is checked before it is used. ``full``: every byte, once a
+            process for a file that does not change. ``size``: which files there are, and their
+            sizes. ``off``: record and manifest alone.
+    """
+
+    root: Path
+    verify: Policy
+
+    def __init__(self, root: Path, verify: Policy = "full") -> None:
+        if verify not in ("full", "size", "off"):
+            raise ValueError(f"verify is {verify!r}: it must be full, size or off")
+        object.__setattr__(self, "root", Path(root).absolute())
+        object.__setattr__(self, "verify", verify)
+
+    @property
+    def layout(self) -> Layout:
+        """Where everything is."""
+        return Layout(self.root)
+
+    def find(self, key: str) -> Entry | None:
+        """Return the entry of ``key`` as its record tells; None if there is none, or its record is damaged.
+
+        Changes nothing and reads no data: ``check`` tells whether they are sound.
+
+        Raises:
+            InvalidKey: if ``key`` is not one.
+            CacheUnavailable: if the file system refuses.
+        """
+        try:
+            return read_record(self.layout, key)
+        except (EntryNotFound, DamagedEntry):
+            return None
+
+    def check(self, key: str) -> str | None:
+        """Return one line that says what is wrong with the entry of ``key``, None if it is sound; change nothing.
+
+        Raises:
+            InvalidKey: if ``key`` is not one.
+            CacheUnavailable: if the file system refuses.
+        """
+        try:
+            inspect(self.layout, key, self.verify)
+        except (EntryNotFound, DamagedEntry) as error:
+            return str(error)
+        return None
+
+    def require(self, key: str) -> Entry:
+        """Return the entry of ``key``, checked as the policy says; a damaged one is moved to quarantine.
+
+        Raises:
+            EntryNotFound: if there is none.
+            DamagedEntry: if it is not what was published; it has to be made again.
+            InvalidKey: if ``key`` is not one.
+            CacheUnavailable: if the file system refuses.
+        """
+        return self._require(key).entry
+
+    def open(self, key: str) -> "xarray.Dataset":
+        """Return the entry's arrays, checked as ``require`` does, read from disk only when they are needed.
+
+        Values are as stored: nothing is masked, scaled or decoded. ``attrs`` tells where they come
+        from: key, digest, stage, code, params, inputs, environment, label, created, seconds, extras.
+        A file that vanishes later raises ``DamagedEntry`` when it is read, never gives NaN.
+
+        Raises:
+            EntryNotFound, DamagedEntry, InvalidKey, CacheUnavailable: as ``require`` does.
+        """
+        found = self._require(key)
+        from cache.reader import open_dataset
+
+        return open_dataset(self.layout.entry(key), found)
+
+    def _require(self, key: str) -> Finding:
+        """Look at an entry; move it aside if it is damaged."""
+        try:
+            return inspect(self.layout, key, self.verify)
+        except DamagedEntry:
+            set_aside_if_damaged(self.layout, key, self.verify)
+            raise
+
+    def begin(self, recipe: Recipe, label: Mapping[str, str]) -> Draft:
+        """Return a fresh draft for the result of ``recipe``.
+
+        Args:
+            recipe: what it is made from.
+            label: what people call it, such as product, dataset and scene; not part of the key.
+
+        Raises:
+            InvalidRecipe: if the label does not map text to text.
+            CacheUnavailable: if the folder cannot be written.
+        """
+        require_texts("label", label)
+        self.layout.create()
+        draft = Draft(self.root, self.layout.new_draft(), recipe, plain_mapping("label", label), time())
+        with writing(draft.path):
+            make_folder(draft.path)
+        publish.STEP_HOOK("begun")
+        return draft
+
+    def entries(self) -> Iterator[Entry]:
+        """Yield every entry with a well-formed record, in the order of keys."""
+        return (entry for key in self.layout.record_keys() if (entry := self.find(key)))
+
+    def history(self, label: Mapping[str, str]) -> list[Entry]:
+        """Return the entries of exactly this label, newest first."""
+        found = [entry for entry in self.entries() if entry.label == dict(label)]
+        return sorted(found, key=lambda entry: (entry.created, entry.key), reverse=True)
+
+    def lock(self, key: str) -> AbstractContextManager[None]:
+        """Return a context in which no other process or thread holds the lock of ``key``.
+
+        It saves work that two would do twice; it ends with its process, however that ends. Do not
+        take it twice: the second would wait for the first.
+
+        Raises:
+            InvalidKey: if ``key`` is not one.
+            CacheUnavailable: if the folder cannot be written.
+        """
+        return self._lock(self.layout.lock("making", key))
+
+    @contextmanager
+    def _lock(self, path: Path) -> Iterator[None]:
+        """Hold a lock; the folder may have to be made first."""
+        self.layout.create()
+        with held(path):
+            yield
+
+    def sweep_drafts(self) -> int:
+        """Delete the drafts of processes of this host that are gone; return how many there were."""
+        drafts = self.layout.drafts
+        abandoned = [path for path in drafts.iterdir() if is_abandoned(path.name)] if drafts.is_dir() else []
+        for path in abandoned:
+            remove(path)
+        return len(abandoned)

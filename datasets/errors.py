@@ -1,0 +1,37 @@
+"""Say what is wrong with a scene, a file or a folder: one family, one line a message."""
+
+
+class DatasetError(ValueError):
+    """Report anything wrong with what a user gave as a data set; the base of the family."""
+
+
+class MissingFileError(DatasetError, FileNotFoundError):
+    """Report a file or folder that is not there or cannot be opened."""
+
+
+class ImageError(DatasetError):
+    """Report an image that cannot be read without loss, or at all."""
+
+
+class PfmError(DatasetError):
+    """Report a PFM file that breaks the format, or an array that PFM cannot hold."""
+
+
+class Png16Error(DatasetError):
+    """Report a file that is no KITTI disparity PNG, or an array that one cannot hold."""
+
+
+class CalibrationError(DatasetError):
+    """Report a ``calib.txt`` with a missing or invalid entry."""
+
+
+class LayoutError(DatasetError):
+    """Report a folder that does not follow the layout its publisher uses."""
+
+
+class SceneNotFound(DatasetError, LookupError):  # noqa: N818 - it reads as the LookupError that it is
+    """Report a scene name that a data set does not have."""
+
+
+class UnknownDatasetError(DatasetError, LookupError):
+    """Report a data set specification whose name is not known."""

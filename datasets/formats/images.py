@@ -1,0 +1,134 @@
+"""Read images as the arrays they are: 8 or 16 bits, gray or RGB, upright, never cut down in silence.
+
+Pillow reads PNG, JPEG, TIFF, BMP and PPM/PGM here, and nothing else gets a chance: no other decoder is ever chosen by
+what happens to be installed, and a file's extension does not count.
+"""
+
+import os
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+from PIL.ImageFile import ImageFile
+
+from datasets.arrays import ImageArray
+from datasets.errors import ImageError, MissingFileError
+from datasets.formats.limits import check_pixels
+
+_FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "PPM")
+_DECODER_ERRORS = (OSError, EOFError, SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, struct.error)
+"""What Pillow's decoders raise on truncated or garbled files."""
+_ORIENTATION = 0x0112
+_UPRIGHT = {
+    2: Image.Transpose.FLIP_LEFT_RIGHT,
+    3: Image.Transpose.ROTATE_180,
+    4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE,
+    6: Image.Transpose.ROTATE_270,
+    7: Image.Transpose.TRANSVERSE,
+    8: Image.Transpose.ROTATE_90,
+}
+_CONVERSIONS = {
+    **{mode: mode for mode in ("L", "RGB", "I", "I;16", "I;16B", "I;16L")},
+    "1": "L",
+    "P": "RGB",
+    "LA": "L",
+    "RGBA": "RGB",
+}
+
+
+def read_image(path: str | os.PathLike[str]) -> ImageArray:
+    """Read an image.
+
+    What is stored decides what comes back: gray gives (y, x), colour and palettes give (y, x, 3) RGB; 16-bit gray
+    stays uint16, everything else is uint8. Alpha is dropped: colours are taken as stored, not blended with anything.
+    The EXIF orientation is applied.
+
+    Returns:
+        uint8 or uint16, (y, x) or (y, x, 3), writable.
+
+    Raises:
+        MissingFileError: If there is no such file.
+        ImageError: If the file is damaged, no image, above `MAX_PIXELS` (known before a pixel is decoded), holds
+            several images, or stores what would not survive: 16-bit colour, floats, CMYK and other colour spaces.
+    """
+    path = Path(path)
+    with _opened(path) as image:
+        orientation = _orientation(image)
+        mode = _target_mode(path, image)
+        converted = image if image.mode == mode else image.convert(mode)
+        if orientation in _UPRIGHT:
+            converted = converted.transpose(_UPRIGHT[orientation])
+        return _to_array(path, np.array(converted))
+
+
+def image_size(path: str | os.PathLike[str]) -> tuple[int, int]:
+    """Read an image's rows and columns, as `read_image` would return them, from its header alone.
+
+    Raises:
+        MissingFileError: If there is no such file.
+        ImageError: If the header is damaged, no image's, or above `MAX_PIXELS`.
+    """
+    with _opened(Path(path)) as image:
+        columns, rows = image.size
+        return (columns, rows) if _orientation(image) >= 5 else (rows, columns)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[ImageFile]:
+    """Open a file and turn whatever goes wrong with it, now or later, into one line."""
+    try:
+        with path.open("rb") as file, Image.open(file, formats=_FORMATS) as image:
+            check_pixels(path, image.height, image.width, ImageError)
+            yield image
+    except ImageError:
+        raise
+    except UnidentifiedImageError as error:
+        raise ImageError(
+            f"{path}: no image in {', '.join(_FORMATS)}; it is empty, damaged or of another kind"
+        ) from error
+    except Image.DecompressionBombError as error:
+        raise ImageError(f"{path}: far too many pixels; scale the image down") from error
+    except (FileNotFoundError, IsADirectoryError, PermissionError) as error:
+        raise MissingFileError(f"{path}: cannot be read ({error.strerror})") from error
+    except _DECODER_ERRORS as error:
+        raise ImageError(f"{path}: damaged image ({' '.join(str(error).split())})") from error
+
+
+def _orientation(image: ImageFile) -> int:
+    # Pillow turns TIFF by itself. Elsewhere only what stands before the pixels counts: the header must give the size.
+    if "exif" not in image.info or image.format == "TIFF":
+        return 1
+    exif = Image.Exif()
+    exif.load(image.info["exif"])
+    return int(exif.get(_ORIENTATION, 1))
+
+
+def _target_mode(path: Path, image: ImageFile) -> str:
+    if getattr(image, "n_frames", 1) > 1:
+        raise ImageError(f"{path}: holds {getattr(image, 'n_frames', 1)} images; save the one to match by itself")
+    for tile in image.tile:
+        layout, *rest = tile.args if isinstance(tile.args, tuple) else (tile.args,)
+        _check_depth(path, image.mode, layout, rest if tile.codec_name.startswith("ppm") else [255])
+    if image.mode not in _CONVERSIONS:
+        raise ImageError(f"{path}: pixels are {image.mode}; convert the image to gray or RGB")
+    return _CONVERSIONS[image.mode]
+
+
+def _check_depth(path: Path, mode: str, layout: object, largest: list[object]) -> None:
+    # What Pillow is about to do is in the tile: it cuts 16-bit colour to 8 bits, and stretches a PPM's odd maxval.
+    if isinstance(layout, str) and ";16" in layout and not mode.startswith("I"):
+        raise ImageError(f"{path}: 16-bit colour would be cut to 8 bits; save it as 8-bit colour or 16-bit gray")
+    if largest not in ([], [255]):
+        raise ImageError(f"{path}: largest value {largest[0]}; supported are 255, and 65535 for binary gray")
+
+
+def _to_array(path: Path, array: np.ndarray[tuple[int, ...], np.dtype[np.integer]]) -> ImageArray:
+    if array.dtype == np.uint8:
+        return array.astype(np.uint8, copy=False)
+    if array.min() < 0 or array.max() > np.iinfo(np.uint16).max:
+        raise ImageError(f"{path}: gray values from {array.min()} to {array.max()} do not fit 16 bits")
+    return array.astype(np.uint16, copy=False)

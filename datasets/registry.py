@@ -1,0 +1,121 @@
+"""Find the scenes that a specification such as ``middlebury:DIR`` names."""
+
+import difflib
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Protocol, cast
+
+from datasets.errors import DatasetError, SceneNotFound, UnknownDatasetError
+from datasets.scene import SceneSource
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Hold the scenes that a specification names, in a fixed order.
+
+    Attributes:
+        spec: What the user asked for, such as ``middlebury:DIR``.
+        scenes: Where each scene comes from; names are unique.
+
+    Raises:
+        DatasetError: If two scenes have one name.
+    """
+
+    spec: str
+    scenes: tuple[SceneSource, ...]
+
+    def __post_init__(self) -> None:
+        twice = [name for name, count in Counter(scene.name for scene in self.scenes).items() if count > 1]
+        if twice:
+            raise DatasetError(f"{self.spec}: several scenes are named {', '.join(twice)}; names must be unique")
+
+    def select(self, names: Iterable[str]) -> "Dataset":
+        """Keep the scenes named, in the order of this data set.
+
+        A name is a scene's full name, or the end of it after a slash where that fits one scene only: ``Cones`` finds
+        ``2003/Cones``.
+
+        Raises:
+            SceneNotFound: If a name fits no scene (the nearest names are given) or several.
+        """
+        chosen = {self._find(name).name for name in names}
+        return Dataset(self.spec, tuple(scene for scene in self.scenes if scene.name in chosen))
+
+    def _find(self, name: str) -> SceneSource:
+        exact = [scene for scene in self.scenes if scene.name == name]
+        fits = exact or [scene for scene in self.scenes if scene.name.endswith(f"/{name}")]
+        if len(fits) == 1:
+            return fits[0]
+        if fits:
+            raise SceneNotFound(
+                f"{self.spec}: {name!r} fits {', '.join(scene.name for scene in fits)}; give one of them"
+            )
+        raise SceneNotFound(f"{self.spec}: no scene {name!r}; {self._hint(name)}")
+
+    def _hint(self, name: str) -> str:
+        short = {scene.name.rsplit("/", 1)[-1].lower(): scene.name for scene in self.scenes}
+        full = {scene.name.lower(): scene.name for scene in self.scenes}
+        near = difflib.get_close_matches(name.lower(), [*full, *short], n=3, cutoff=0.5)
+        if near:
+            return f"did you mean {' or '.join(dict.fromkeys((full | short)[key] for key in near))}?"
+        return f"it has {_join([scene.name for scene in self.scenes])}"
+
+
+class _Lister(Protocol):
+    def list_scenes(self, argument: str) -> tuple[SceneSource, ...]:
+        """List the scenes that the text after the colon stands for."""
+
+
+@dataclass(frozen=True)
+class _Benchmark:
+    pattern: str
+    description: str
+
+
+_BENCHMARKS = {
+    "motorcycle": _Benchmark("motorcycle", "the Middlebury 2014 Motorcycle pair that scikit-image ships"),
+    "middlebury": _Benchmark(
+        "middlebury:DIR",
+        "Middlebury MiddEval3, 2014, 2001, 2003, 2005 or 2006: a scene, a collection or a root of several",
+    ),
+    "kitti2015": _Benchmark("kitti2015:DIR", "KITTI Stereo 2015: its root or its training folder"),
+    "eth3d": _Benchmark("eth3d:DIR", "ETH3D two-view: a scene, two_view_training or its parent"),
+    "synthetic": _Benchmark(
+        "synthetic[:KEY=VALUE,...]", "rendered planes with exact truth; see datasets.synthetic for the keys"
+    ),
+}
+
+
+def open_dataset(spec: str) -> Dataset:
+    """List the scenes that a specification names; no pixel is decoded unless a range must be read from the truth.
+
+    Args:
+        spec: ``motorcycle``, ``middlebury:DIR``, ``kitti2015:DIR``, ``eth3d:DIR`` or ``synthetic[:KEY=VALUE,...]``.
+
+    Raises:
+        UnknownDatasetError: If the name before the colon is not known; the nearest one is given.
+        DatasetError: If the folder does not follow the layout, or a file in it is not valid.
+    """
+    name, _, argument = spec.partition(":")
+    if name not in _BENCHMARKS:
+        near = difflib.get_close_matches(name.lower(), _BENCHMARKS, n=1, cutoff=0.4)
+        hint = f"did you mean {_BENCHMARKS[near[0]].pattern}?" if near else f"known are {', '.join(_patterns())}"
+        raise UnknownDatasetError(f"no data set {name!r}; {hint}")
+    # A benchmark's module is imported when it is asked for: listing the names must stay cheap.
+    lister = cast(_Lister, import_module(f"datasets.{name if name != 'kitti2015' else 'kitti'}"))
+    return Dataset(spec, lister.list_scenes(argument))
+
+
+def describe() -> list[tuple[str, str]]:
+    """Give each specification's pattern and what it stands for."""
+    return [(benchmark.pattern, benchmark.description) for benchmark in _BENCHMARKS.values()]
+
+
+def _patterns() -> list[str]:
+    return [pattern for pattern, _ in describe()]
+
+
+def _join(names: list[str], most: int = 12) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

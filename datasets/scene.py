@@ -1,0 +1,277 @@
+"""Describe a stereo scene: its two views, its ground truth, and where both come from.
+
+Everywhere a disparity ``d`` belongs to a pixel of the LEFT view unless said otherwise, and ``x_right = x_left - d``.
+"""
+
+import hashlib
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal, Protocol, TypeAlias, cast
+
+import numpy as np
+
+from datasets.arrays import DisparityMap, ImageArray, Mask
+from datasets.errors import DatasetError, MissingFileError
+
+Split: TypeAlias = Literal["train", "test"]
+Parameter: TypeAlias = bool | int | float | str | None
+MaskKind: TypeAlias = Literal["published", "left-right check", "warped truth", "exact", "non-occluded truth", "none"]
+
+IMAGE_ROLES: tuple[str, ...] = ("left", "right")
+"""Roles of the files that the two views are read from."""
+
+TRUTH_ROLES: tuple[str, ...] = ("truth", "truth_right", "truth_nonocc", "mask")
+"""Roles of the files that the ground truth is read from."""
+
+
+@dataclass(frozen=True)
+class DisparityRange:
+    """Bound the disparities to search, in whole pixels, both ends included; negative ones are allowed.
+
+    Raises:
+        DatasetError: If the maximum is below the minimum.
+
+    >>> DisparityRange(0, 69).count
+    70
+    """
+
+    minimum: int
+    maximum: int
+
+    def __post_init__(self) -> None:
+        if self.maximum < self.minimum:
+            raise DatasetError(f"disparity range [{self.minimum}, {self.maximum}] is empty; give minimum <= maximum")
+
+    @property
+    def count(self) -> int:
+        """Count the disparities of the range."""
+        return self.maximum - self.minimum + 1
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Hold what turns disparity into depth: ``Z = baseline * focal / (d + doffs)``, in millimetres.
+
+    Attributes:
+        focal: Focal length in pixels, above 0.
+        baseline: Distance between the two cameras in millimetres, above 0.
+        doffs: Difference of the principal points' columns, right minus left, in pixels.
+    """
+
+    focal: float
+    baseline: float
+    doffs: float
+
+    def __post_init__(self) -> None:
+        for name in ("focal", "baseline"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise DatasetError(f"calibration: {name} is {value}; it must be finite and above 0")
+        if not math.isfinite(self.doffs):
+            raise DatasetError(f"calibration: doffs is {self.doffs}; it must be finite")
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """Hold a scene's ground truth.
+
+    Attributes:
+        disparity: (y, x) float32, pixels, left view, NaN where unknown.
+        nonocc: (y, x) bool, true where the pixel is visible in both views and its truth is known.
+        mask: Where ``nonocc`` comes from; "none" means that visibility is not known and every known pixel counts.
+        right: (y, x) float32, pixels, right view (``x_left = x_right + d``), NaN where unknown; None if there is none.
+
+    Raises:
+        DatasetError: If shapes or dtypes disagree, an array is empty, a disparity is infinite, or ``nonocc`` holds a
+            pixel of unknown truth.
+    """
+
+    disparity: DisparityMap
+    nonocc: Mask
+    mask: MaskKind
+    right: DisparityMap | None = None
+
+    def __post_init__(self) -> None:
+        _check_map("truth", self.disparity)
+        if self.nonocc.dtype != np.bool_ or self.nonocc.shape != self.disparity.shape:
+            raise DatasetError(
+                f"non-occlusion mask is {_describe(self.nonocc)}; the truth needs bool, {_size(self.disparity)}"
+            )
+        if np.isnan(self.disparity[self.nonocc]).any():
+            raise DatasetError("non-occlusion mask holds pixels whose truth is unknown; clear them first")
+        if self.right is not None:
+            _check_map("right truth", self.right)
+            if self.right.shape != self.disparity.shape:
+                raise DatasetError(
+                    f"right truth is {_size(self.right)}, left truth {_size(self.disparity)}; both must agree"
+                )
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Hold a rectified pair, what is known about it, and the disparities to search.
+
+    Attributes:
+        name: Unique within its data set.
+        left: (y, x) or (y, x, 3), uint8 or uint16: the reference view.
+        right: The other view, of the same shape and dtype.
+        truth: Ground truth of the same height and width, or None.
+        disparities: The range to search.
+        calibration: What depth needs, or None.
+
+    Raises:
+        DatasetError: If an image is empty, has another dtype or number of dimensions, or if shapes disagree.
+    """
+
+    name: str
+    left: ImageArray
+    right: ImageArray
+    truth: Truth | None
+    disparities: DisparityRange
+    calibration: Calibration | None = None
+
+    def __post_init__(self) -> None:
+        for side, image in (("left", self.left), ("right", self.right)):
+            _check_image(f"{self.name}: {side} image", image)
+        if self.left.shape != self.right.shape or self.left.dtype != self.right.dtype:
+            raise DatasetError(
+                f"{self.name}: left image is {_describe(self.left)}, right image {_describe(self.right)}; "
+                "both views must agree"
+            )
+        if self.truth is not None and self.truth.disparity.shape != self.left.shape[:2]:
+            raise DatasetError(
+                f"{self.name}: truth is {_size(self.truth.disparity)}, the images {_size(self.left)}; both must agree"
+            )
+
+
+class SceneReader(Protocol):
+    """Read a scene's files: what a module named by `SceneSource.reader` offers."""
+
+    def read_images(
+        self, files: Mapping[str, Path], parameters: Mapping[str, Parameter]
+    ) -> tuple[ImageArray, ImageArray]:
+        """Read the left and the right view."""
+
+    def read_truth(self, files: Mapping[str, Path], parameters: Mapping[str, Parameter]) -> Truth:
+        """Read the ground truth; called only where there is one."""
+
+
+@dataclass(frozen=True)
+class SceneSource:
+    """Say where a scene comes from: cheap to list, to compare and to pickle; pixels are read by `load` only.
+
+    Attributes:
+        name: Unique within its data set.
+        dataset: The data set without a path, such as ``middlebury/MiddEval3``.
+        split: Whether it may be trained on.
+        size: Rows and columns, from the image's header.
+        disparities: The range to search.
+        reader: Dotted name of the module that reads it (a `SceneReader`).
+        files: Role to path. `IMAGE_ROLES` and `TRUTH_ROLES` name those that images and truth are read from.
+        parameters: Whatever else the reader needs.
+        has_truth: Whether a ground truth is there.
+        calibration: What depth needs, or None.
+    """
+
+    name: str
+    dataset: str
+    split: Split
+    size: tuple[int, int]
+    disparities: DisparityRange
+    reader: str
+    files: Mapping[str, Path] = field(hash=False)
+    parameters: Mapping[str, Parameter] = field(default_factory=dict, hash=False)
+    has_truth: bool = False
+    calibration: Calibration | None = None
+
+    def load(self) -> Scene:
+        """Read images and truth.
+
+        Raises:
+            DatasetError: If a file is missing, damaged, or of another size than was listed.
+        """
+        left, right = self.load_images()
+        return Scene(self.name, left, right, self.load_truth(), self.disparities, self.calibration)
+
+    def load_images(self) -> tuple[ImageArray, ImageArray]:
+        """Read the left and the right view only; raises what `load` raises."""
+        left, right = self._reader().read_images(self.files, self.parameters)
+        Scene(self.name, left, right, None, self.disparities)
+        self._check_size("images", left)
+        return left, right
+
+    def load_truth(self) -> Truth | None:
+        """Read the ground truth only, None where there is none; raises what `load` raises."""
+        if not self.has_truth:
+            return None
+        truth = self._reader().read_truth(self.files, self.parameters)
+        self._check_size("truth", truth.disparity)
+        return truth
+
+    def identity(self, roles: Collection[str] | None = None) -> dict[str, Any]:
+        """Name the content that the scene is read from, ready for JSON: no paths, no times.
+
+        Args:
+            roles: The roles to take in; None takes all. A role without a file is left out.
+
+        Returns:
+            ``{"reader": module, "files": {role: sha256 of the bytes, in hex}, "parameters": {...}}``
+
+        Raises:
+            MissingFileError: If a file cannot be read.
+        """
+        chosen = sorted(role for role in self.files if roles is None or role in roles)
+        digests = {role: _sha256(self.files[role]) for role in chosen}
+        return {"reader": self.reader, "files": digests, "parameters": dict(self.parameters)}
+
+    def image_identity(self) -> dict[str, Any]:
+        """Name the content that the images are read from; see `identity`."""
+        return self.identity(IMAGE_ROLES)
+
+    def truth_identity(self) -> dict[str, Any]:
+        """Name the content that the truth is read from; see `identity`."""
+        return self.identity(TRUTH_ROLES)
+
+    def _reader(self) -> SceneReader:
+        return cast(SceneReader, import_module(self.reader))
+
+    def _check_size(self, what: str, array: np.ndarray[Any, Any]) -> None:
+        if array.shape[:2] != self.size:
+            rows, columns = self.size
+            raise DatasetError(
+                f"{self.name}: {what} of {_size(array)}, but {rows} x {columns} was listed; list it again"
+            )
+
+
+def _sha256(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise MissingFileError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def _size(array: np.ndarray[Any, Any]) -> str:
+    return " x ".join(map(str, array.shape[:2]))
+
+
+def _describe(array: np.ndarray[Any, Any]) -> str:
+    return f"{array.dtype}, {' x '.join(map(str, array.shape)) or 'a scalar'}"
+
+
+def _check_image(what: str, image: ImageArray) -> None:
+    gray_or_rgb = image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)
+    if image.dtype not in (np.uint8, np.uint16) or not gray_or_rgb:
+        raise DatasetError(f"{what} is {_describe(image)}; give uint8 or uint16, (rows, columns) or (rows, columns, 3)")
+    if image.size == 0:
+        raise DatasetError(f"{what} is empty ({_size(image)} pixels)")
+
+
+def _check_map(what: str, disparity: DisparityMap) -> None:
+    if disparity.dtype != np.float32 or disparity.ndim != 2 or disparity.size == 0:
+        raise DatasetError(f"{what} is {_describe(disparity)}; give float32, (rows, columns), not empty")
+    if np.isinf(disparity).any():
+        raise DatasetError(f"{what} holds infinite disparities; mark unknown pixels with NaN")

@@ -1,0 +1,25 @@
+"""What can go wrong in a run: what the user can mend is one line, the rest keeps its cause."""
+
+from cache import CacheError
+from datasets import DatasetError
+from stages.stage import StageError
+
+
+class PipelineError(Exception):
+    """Base of the errors of this package."""
+
+
+class UsageError(PipelineError, ValueError):
+    """A request that cannot be carried out as it stands: an unknown name, a value out of range."""
+
+
+class StageFailed(PipelineError, RuntimeError):  # noqa: N818 - it says what happened
+    """A stage raised; the message names product, scene, tile and cause."""
+
+
+class StageRefused(UsageError):  # noqa: N818
+    """A stage refused what it was given; the message names product, scene, tile and reason."""
+
+
+USER_ERRORS = (UsageError, DatasetError, CacheError, StageError)
+"""Errors that one line explains: the command line prints it and exits with 2."""

@@ -1,0 +1,150 @@
+"""Carry out a plan: its steps become Dask tasks, on this machine's threads or on a cluster."""
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from cache import Draft, Store
+from pipeline import tasks
+from pipeline.errors import UsageError
+from pipeline.plan import Plan, Planned
+from pipeline.steps import Step
+from pipeline.tasks import Context, Made, Unwatched, Watch
+from pipeline.tiles import cut_rows
+
+
+def execute(
+    plan: Plan,
+    store: Store,
+    watch: Watch,
+    extras: Mapping[str, Any],
+    scheduler: str | None = None,
+    workers: int | None = None,
+) -> dict[str, Made]:
+    """Make what a plan lacks and return every step's result by its id.
+
+    Args:
+        plan: from ``make_plan``.
+        store: the same cache.
+        watch: told how it goes on; on a cluster only of products that are done.
+        extras: stored beside each result.
+        scheduler: address of a Dask scheduler, ``tcp://...``; None for threads of this process.
+        workers: threads; None for one a core.
+
+    Raises:
+        StageRefused: if a stage refuses what it was given.
+        StageFailed: if a stage fails; what was made before is kept, nothing half-made is left.
+    """
+    store.sweep_drafts()
+    if not plan.todo():
+        return {planned.step.id: _there(planned) for planned in plan.steps}
+    if scheduler:
+        return _on_cluster(plan, Context(store, Unwatched(), extras), watch, scheduler)
+    return _on_threads(plan, store, watch, extras, workers or os.cpu_count() or 1)
+
+
+def _there(planned: Planned) -> Made:
+    return Made(planned.step, str(planned.key), str(planned.digest), planned.seconds or 0.0, reused=True)
+
+
+def _on_threads(plan: Plan, store: Store, watch: Watch, extras: Mapping[str, Any], workers: int) -> dict[str, Made]:
+    import dask
+
+    drafts = _Drafts(watch)
+    results = _graph(plan, Context(store, drafts, extras))
+    pool = ThreadPoolExecutor(workers)
+    try:
+        made: Sequence[Made] = dask.compute(*results, scheduler="threads", pool=pool)
+    except Exception:
+        # The failed task's siblings go on for a while: what they write must not outlive the drafts.
+        pool.shutdown(wait=True, cancel_futures=True)
+        raise
+    finally:
+        drafts.discard()
+        pool.shutdown(wait=False, cancel_futures=True)
+    return {each.step.id: each for each in made}
+
+
+def _on_cluster(plan: Plan, context: Context, watch: Watch, address: str) -> dict[str, Made]:
+    from distributed import Client, as_completed
+
+    try:
+        client = Client(address, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise UsageError(f"no Dask scheduler answers at {address}: {error}") from None
+    with client:
+        futures = client.compute(_graph(plan, context))
+        made = {}
+        for future in as_completed(futures):
+            each: Made = future.result()
+            made[each.step.id] = each
+            if not each.reused:
+                watch.published(each)
+    return {planned.step.id: made[planned.step.id] for planned in plan.steps}
+
+
+def _graph(plan: Plan, context: Context) -> list[Any]:
+    """Return one delayed ``Made`` a step."""
+    from dask import delayed
+
+    results: dict[str, Any] = {}
+    for planned in plan.steps:
+        if planned.state == "hit":
+            results[planned.step.id] = delayed(_there(planned), traverse=False)
+        else:
+            results[planned.step.id] = _delayed_step(planned.step, plan, context, results)
+    return list(results.values())
+
+
+def _delayed_step(step: Step, plan: Plan, context: Context, results: Mapping[str, Any]) -> Any:  # noqa: ANN401
+    from dask import delayed
+
+    def task(function: Any, *arguments: Any) -> Any:  # noqa: ANN401
+        return delayed(function, pure=False, traverse=False)(*arguments)
+
+    shared = delayed(context, traverse=False)
+    inputs = [results[each] for each in dict.fromkeys(each for ids in step.inputs.values() for each in ids)]
+    forced = step.product in plan.forced
+    job = task(tasks.begin, shared, delayed(step, traverse=False), inputs, forced, tasks.len_tiles(step))
+    if step.stage.tile_rows is None or step.size is None:
+        parts = [task(tasks.make_whole, shared, job)]
+    else:
+        ready = task(tasks.create_arrays, job)
+        rows = cut_rows(step.size[0], step.stage.tile_rows)
+        parts = [task(tasks.make_tile, shared, ready, delayed(each, traverse=False)) for each in rows]
+    return task(tasks.publish, shared, job, parts)
+
+
+class _Drafts:
+    """A watch that also remembers which drafts are open, to delete them when the run ends early."""
+
+    def __init__(self, watch: Watch) -> None:
+        self._watch = watch
+        self._open: dict[str, Draft] = {}
+
+    def begun(self, step: Step, draft: Draft, tiles: int) -> None:
+        self._open[step.id] = draft
+        self._watch.begun(step, draft, tiles)
+
+    def advanced(self, step: Step, done: int, total: int, note: str) -> None:
+        self._watch.advanced(step, done, total, note)
+
+    def published(self, made: Made) -> None:
+        self._open.pop(made.step.id, None)
+        self._watch.published(made)
+
+    def discard(self) -> None:
+        """Delete the drafts that were not published."""
+        for draft in self._open.values():
+            draft.discard()
+        self._open.clear()
+
+
+def totals(made: Iterable[Made]) -> dict[str, tuple[int, int]]:
+    """Return by product how many results were there before and how many were made."""
+    counts: dict[str, tuple[int, int]] = {}
+    for each in made:
+        reused, fresh = counts.get(each.step.product, (0, 0))
+        counts[each.step.product] = (reused + each.reused, fresh + (not each.reused))
+    return counts

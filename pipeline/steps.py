@@ -1,0 +1,268 @@
+"""The steps of a run: which products are made from which, for the scenes and configurations at hand.
+
+A step is a product of one scene (or of the training split) with its settings. Several configurations
+share the steps in which they agree, so a sweep computes nothing twice. Nothing here looks at a cache.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import Any
+
+from cache import Recipe, code_parts
+from datasets import Dataset, SceneSource
+from pipeline import shipped, sources
+from pipeline.config import Config, nearest
+from pipeline.errors import UsageError
+from stages.catalog import STAGES
+from stages.precision import resolve
+from stages.stage import Params, Stage
+
+PACKAGES = ("pipeline", "stages", "datasets", "cache")
+NETS = ("matching_net", "evaluation_net")
+PRODUCTS = ("images", "truth", *STAGES)
+"""Every product, in order; the names that ``--upto`` takes."""
+SPLIT = "training split"
+"""Stands for a scene in steps that belong to all training scenes together."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One product of one scene, or of the training split.
+
+    Attributes:
+        id: names product, scene and everything it is made from; equal for equal work.
+        stage: its declaration.
+        scene: the scene's name, or ``SPLIT``.
+        dataset: the scene's dataset, without a path.
+        argument: what its function is given first: settings, or the source to read.
+        settings: the part of the key that says how: plain JSON.
+        inputs: ids of the steps it is made from, by product; of a split step, one a training scene.
+        size: rows and columns of the image; None for a split step.
+        code: hash of every module that decides the result.
+        environment: what else changes its bits.
+        R: the confidence threshold that a product below ``semidense`` was made with.
+    """
+
+    id: str
+    stage: Stage
+    scene: str
+    dataset: str
+    argument: Any
+    settings: Mapping[str, Any]
+    inputs: Mapping[str, tuple[str, ...]]
+    size: tuple[int, int] | None
+    code: Mapping[str, str]
+    environment: Mapping[str, str]
+    R: float | None = None
+
+    @property
+    def product(self) -> str:
+        """The name of its product."""
+        return self.stage.product
+
+    @property
+    def label(self) -> dict[str, str]:
+        """What people call its result, whatever its settings."""
+        return {"product": self.product, "dataset": self.dataset, "scene": self.scene}
+
+    @property
+    def name(self) -> str:
+        """Product and scene, for messages."""
+        return f"{self.product} of {self.scene}"
+
+    def recipe(self, digests: Mapping[str, str]) -> Recipe:
+        """Return the recipe, given the output digest of each input step by its id."""
+        inputs: dict[str, str | list[str]] = {
+            product: [digests[step] for step in ids] if self.takes_list(product) else digests[ids[0]]
+            for product, ids in self.inputs.items()
+        }
+        return Recipe(self.product, self.code, self.settings, inputs, self.environment)
+
+    def takes_list(self, product: str) -> bool:
+        """Return whether an input comes once for each training scene."""
+        return self.stage.scope == "split" and _scope(product) == "scene"
+
+
+def _scope(product: str) -> str:
+    return STAGES[product].scope if product in STAGES else "scene"
+
+
+@dataclass
+class Graph:
+    """The steps of a run in an order in which each comes after its inputs; what was asked for, by scene.
+
+    Attributes:
+        steps: by id, in order.
+        targets: ids of the products that were asked for.
+        notes: what a person should know, such as scenes left out.
+    """
+
+    steps: dict[str, Step] = field(default_factory=dict)
+    targets: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be made.
+
+    Attributes:
+        dataset: the scenes.
+        configs: one configuration, or several of a sweep.
+        upto: the product to stop at.
+        train: train the networks instead of taking the shipped weights.
+        training: the scenes to train on; needed with ``train``.
+    """
+
+    dataset: Dataset
+    configs: tuple[Config, ...]
+    upto: str = "metrics"
+    train: bool = False
+    training: tuple[SceneSource, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse a product that does not exist."""
+        if self.upto not in PRODUCTS:
+            raise UsageError(f"no product {self.upto!r}; {nearest(self.upto, PRODUCTS)}")
+
+
+def build(request: Request) -> Graph:
+    """Return the steps that a request needs.
+
+    Raises:
+        UsageError: if there is nothing to do.
+        StageError: if shipped weights are needed and there are none.
+    """
+    graph = Graph()
+    trained_on = {json.dumps(scene.image_identity(), sort_keys=True) for scene in request.training}
+    for config in request.configs:
+        builder = _Builder(graph, config, request)
+        if request.upto in STAGES and STAGES[request.upto].scope == "split":
+            graph.targets.append(builder.product(request.upto, None))
+            continue
+        for scene in request.dataset.scenes:
+            if json.dumps(scene.image_identity(), sort_keys=True) in trained_on:
+                graph.notes.append(f"{scene.name} is a training scene: it is left out, since nothing is tested on it")
+            elif request.upto in ("truth", "metrics") and not scene.has_truth:
+                graph.notes.append(f"{scene.name} has no ground truth: there are no metrics for it")
+                graph.targets.append(builder.product("images" if request.upto == "truth" else "semidense", scene))
+            else:
+                graph.targets.append(builder.product(request.upto, scene))
+    graph.notes = list(dict.fromkeys(graph.notes))
+    if not graph.targets:
+        raise UsageError(f"{request.dataset.spec}: no scene is left to work on; {'; '.join(graph.notes)}")
+    return graph
+
+
+@dataclass
+class _Builder:
+    """Adds the steps of one configuration to a graph."""
+
+    graph: Graph
+    config: Config
+    request: Request
+
+    def product(self, product: str, scene: SceneSource | None) -> str:
+        """Add the step of a product, and before it those it is made from; return its id."""
+        if product == "images" and scene:
+            return self._add_source(sources.IMAGES, scene, scene.image_identity())
+        if product == "truth" and scene:
+            bounds = [scene.disparities.minimum, scene.disparities.maximum]
+            return self._add_source(sources.TRUTH, scene, scene.truth_identity() | {"range": bounds})
+        if product in NETS and not self.request.train:
+            return self._add_shipped(product)
+        stage = STAGES[product]
+        scene = None if stage.scope == "split" else scene
+        inputs = {name: self._inputs(stage, name, scene) for name in stage.inputs}
+        return self._add_stage(stage, scene, inputs)
+
+    def _inputs(self, stage: Stage, product: str, scene: SceneSource | None) -> tuple[str, ...]:
+        if stage.scope == "split" and _scope(product) == "scene":
+            return tuple(self.product(product, source) for source in self.request.training)
+        return (self.product(product, scene),)
+
+    def _add_source(self, stage: Stage, scene: SceneSource, identity: Mapping[str, Any]) -> str:
+        code = code_parts(stage.module, PACKAGES) | code_parts(scene.reader, PACKAGES)
+        return self._add(stage, scene, scene, identity, {}, code)
+
+    def _add_shipped(self, product: str) -> str:
+        stage = shipped.WEIGHTS[product]
+        settings = {"shipped": shipped.weights_digest(product)}
+        return self._add(stage, None, product, settings, {}, code_parts(stage.module, PACKAGES))
+
+    def _add_stage(self, stage: Stage, scene: SceneSource | None, inputs: Mapping[str, tuple[str, ...]]) -> str:
+        params = _resolved(self.config.section(stage.product), scene)
+        settings = params.model_dump(mode="json") | {"tiles": _tiles(stage, params)}
+        return self._add(stage, scene, params, settings, inputs, code_parts(stage.module, PACKAGES))
+
+    def _add(
+        self,
+        stage: Stage,
+        scene: SceneSource | None,
+        argument: object,
+        settings: Mapping[str, Any],
+        inputs: Mapping[str, tuple[str, ...]],
+        code: Mapping[str, str],
+    ) -> str:
+        name, dataset, size = (scene.name, scene.dataset, scene.size) if scene else (SPLIT, SPLIT, None)
+        identity = json.dumps([stage.product, name, dataset, size, settings, inputs], sort_keys=True)
+        step_id = hashlib.sha256(identity.encode()).hexdigest()[:16]
+        if step_id not in self.graph.steps:
+            threshold = self.config.semidense.R if stage.product in ("semidense", "metrics") else None
+            self.graph.steps[step_id] = Step(
+                id=step_id,
+                stage=stage,
+                scene=name,
+                dataset=dataset,
+                argument=argument,
+                settings=dict(settings),
+                inputs=dict(inputs),
+                size=size,
+                code=dict(code),
+                environment=_environment(),
+                R=threshold,
+            )
+        return step_id
+
+
+def _resolved(params: Params, scene: SceneSource | None) -> Params:
+    """Return the settings with what was left open filled in: the scene's range, this CPU's precision."""
+    update: dict[str, Any] = {}
+    if hasattr(params, "precision"):
+        update["precision"] = resolve(params.precision)
+    if scene and getattr(params, "d_min", 0) is None:
+        update["d_min"] = scene.disparities.minimum
+    if scene and getattr(params, "d_max", 0) is None:
+        update["d_max"] = scene.disparities.maximum
+    return type(params).model_validate(dict(params) | update)
+
+
+def _tiles(stage: Stage, params: Params) -> str:
+    """Say how the image is cut: it decides the order of sums, and which files there are."""
+    if stage.tile_rows is None:
+        return "whole"
+    return f"{stage.tile_rows} rows, halo {stage.halo(params)}, {stage.border}"
+
+
+def _environment() -> dict[str, str]:
+    """Return what changes bits besides code and settings: major versions, and the format of the arrays."""
+    return {"torch": version("torch").split(".")[0], "numpy": version("numpy").split(".")[0], "zarr_format": "3"}
+
+
+def training_scenes(datasets: Iterable[Dataset]) -> tuple[SceneSource, ...]:
+    """Return the scenes that may be trained on and have a truth.
+
+    Raises:
+        UsageError: if there is none.
+    """
+    found: Sequence[Dataset] = list(datasets)
+    scenes = tuple(scene for dataset in found for scene in dataset.scenes if scene.split == "train" and scene.has_truth)
+    if not scenes:
+        names = ", ".join(dataset.spec for dataset in found)
+        raise UsageError(
+            f"{names}: no training scene; name a dataset that has some with --set training.dataset=middlebury:DIR"
+        )
+    return scenes

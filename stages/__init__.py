@@ -1,0 +1,1 @@
+"""What the paper says: pure functions over arrays, the two networks, their training, the metrics."""

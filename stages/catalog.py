@@ -1,0 +1,30 @@
+"""All stages, in order: every product comes after those it is made from.
+
+The declarations stand beside what can be set for them; the functions that they name are imported
+when something is computed.
+"""
+
+from stages.disparity import DISPARITY
+from stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
+from stages.filtering import SEMIDENSE
+from stages.matching.declaration import COST_VOLUME, MATCHING_NET, MATCHING_SAMPLES
+from stages.metrics import METRICS
+from stages.stage import Stage
+from stages.transforms.channels import CHANNELS
+
+CATALOG: tuple[Stage, ...] = (
+    CHANNELS,
+    MATCHING_SAMPLES,
+    MATCHING_NET,
+    COST_VOLUME,
+    DISPARITY,
+    EVALUATION_SAMPLES,
+    EVALUATION_NET,
+    CONFIDENCE,
+    SEMIDENSE,
+    METRICS,
+)
+"""The stages, in the order of the dataflow."""
+
+STAGES = {stage.product: stage for stage in CATALOG}
+"""The stages by the name of their product."""

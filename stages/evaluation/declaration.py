@@ -1,0 +1,83 @@
+"""What the evaluation-Net's three products are made from, and what can be set. Light: it does not load torch."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from stages.precision import Precision
+from stages.schedule import SHARDS, Schedule
+from stages.stage import Output, Params, Stage
+
+PATCH = 101
+"""Side of the square patch that one answer of the evaluation-Net stands for, in pixels."""
+RADIUS = PATCH // 2
+STRIDE = 16
+"""Pixels between the answers of the pooled network."""
+
+
+class EvaluationSamplesParams(Params):
+    """What the evaluation-Net learns from."""
+
+    form: Literal["strided", "patch"] = Field("strided", description="grids of pixels, or the paper's single pixels")
+    samples: int = Field(12000, ge=1, description="grids in all, over the scenes in equal parts (strided)")
+    rows: int = Field(12, ge=1, le=64, description="rows of a grid, 16 px apart (strided)")
+    columns: int = Field(16, ge=1, le=64, description="columns of a grid, 16 px apart (strided)")
+    tolerance: float = Field(1.0, gt=0, description="T_e: largest error of a disparity that counts as right, px")
+    seed: int = Field(0, ge=0, description="seed of the draw")
+
+
+class EvaluationNetParams(Schedule):
+    """The evaluation-Net and how it is trained."""
+
+    steps: int = Field(1500, ge=1, description="optimiser steps")
+    first_rate: float = Field(0.001, gt=0, description="learning rate of the first step")
+    batch: int = Field(8, ge=SHARDS, description="samples a step; a multiple of the number of shards")
+    flip: bool = Field(True, description="turn half of the samples upside down (mirroring would move the occlusions)")
+    relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting; 0: none, as the paper")
+    precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
+    seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
+
+
+class ConfidenceParams(Params):
+    """In which arithmetic the evaluation-Net runs."""
+
+    precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
+
+
+EVALUATION_SAMPLES = Stage(
+    product="evaluation_samples",
+    inputs=("disparity", "truth"),
+    outputs=(
+        Output("scene", ("sample",), "int32", "1", "training scene, in the order of the split"),
+        Output("y", ("sample",), "int32", "px", "row of the grid's first pixel"),
+        Output("x", ("sample",), "int32", "px", "column of the grid's first pixel"),
+        Output("labels", ("sample", "row", "column"), "int8", "1", "1 right, 0 wrong, -1 unknown"),
+    ),
+    compute="stages.evaluation.samples:draw_samples",
+    params=EvaluationSamplesParams,
+    scope="split",
+)
+
+EVALUATION_NET = Stage(
+    product="evaluation_net",
+    inputs=("evaluation_samples", "images", "disparity"),
+    outputs=(
+        Output("parameters", ("parameter",), "float32", "1", "weights of the evaluation-Net"),
+        Output("loss", ("step",), "float32", "1", "class-balanced cross-entropy of each training step"),
+    ),
+    compute="stages.evaluation.train:train_evaluation_net",
+    params=EvaluationNetParams,
+    scope="split",
+    monitored=True,
+)
+
+CONFIDENCE = Stage(
+    product="confidence",
+    inputs=("images", "disparity", "evaluation_net"),
+    outputs=(Output("confidence", ("y", "x"), "float32", "1", "probability that the disparity is right, in [0, 1]"),),
+    compute="stages.evaluation.confidence:compute_confidence",
+    params=ConfidenceParams,
+    tile_rows=256,
+    halo=lambda _: RADIUS,
+    border="edge",
+)

@@ -1,0 +1,118 @@
+"""evaluation-Net: the network that says whether a disparity is right (the paper's Table 1, right).
+
+Input of one sample: 101 x 101 pixels of the left view and of its raw disparity map.
+
+    layer         kernel, filters   output a layer
+    conv1, pool   3x3, 16           99, 49     the same weights on both input layers
+    conv2, pool   3x3, 32           47, 23     the same weights on both
+    conv3, pool   3x3, 64           21, 10     the same weights on both
+    conv4, pool   3x3x2, 128        8, 4       joins the two layers: a sum of one convolution each
+    fc            128               1
+    out           2                 1          output 1: the disparity is right, output 0: it is wrong
+
+The poolings round down, so a patch's last 7 rows and columns never reach the output: patches align by
+their top left corners, and the answer at a corner depends on 94 x 94 pixels.
+
+A pooled network on a larger map answers at every 16th pixel (``forward``, used in training). ``dense``
+answers at every pixel by pooling at all four offsets, which splits a map into four *fragments*, each a
+quarter of the size; after four poolings 256 fragments interleave to the whole map. The convolutions
+stay plain, and none is computed twice.
+"""
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from stages.evaluation.declaration import PATCH, STRIDE
+
+DISPARITY_UNIT = 5.0
+"""Disparities, in px, are divided by this: one scale for all scenes, on which an error of 1 px still shows."""
+
+
+Pool = Callable[[Tensor], Tensor]
+"""A way of pooling: (B, C, H, W) -> (a multiple of B, C, H // 2, W // 2)."""
+
+
+class EvaluationNet(nn.Module):
+    """The paper's evaluation-Net."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.conv1 = nn.Conv2d(1, 16, 3)
+        self.conv2 = nn.Conv2d(16, 32, 3)
+        self.conv3 = nn.Conv2d(32, 64, 3)
+        self.conv4_gray = nn.Conv2d(64, 128, 3)
+        self.conv4_disparity = nn.Conv2d(64, 128, 3, bias=False)
+        self.fc = nn.Conv2d(128, 128, 4)
+        self.out = nn.Conv2d(128, 2, 1)
+
+    def forward(self, layers: Tensor) -> Tensor:
+        """Return the logits of the patches whose top left corners lie 16 px apart.
+
+        Args:
+            layers: (B, 2, H, W), standardised gray and disparity in units of ``DISPARITY_UNIT``.
+
+        Returns:
+            (B, 2, (H - 101) // 16 + 1, (W - 101) // 16 + 1).
+        """
+        return self._head(self._run(layers, lambda maps: functional.max_pool2d(maps, 2)))
+
+    def dense(self, layers: Tensor) -> Tensor:
+        """Return the log-odds that the disparity is right, for every patch of one pair of maps.
+
+        Args:
+            layers: (1, 2, H, W), as for ``forward``.
+
+        Returns:
+            (H - 100, W - 100) float32, at the patches' top left corners.
+        """
+        logits = self._head(self._run(layers, fragments)).float()
+        height, width = (length - PATCH + 1 for length in layers.shape[2:])
+        return interleave(logits[:, 1] - logits[:, 0])[:height, :width]
+
+    def _run(self, layers: Tensor, pool: Pool) -> Tensor:
+        """Return conv4's output after its pooling, for a way of pooling."""
+        batch, _, height, width = layers.shape
+        # Layers go first, so that a pooling that multiplies the batch keeps the two apart.
+        maps = layers.transpose(0, 1).reshape(2 * batch, 1, height, width)
+        gray, disparity = (self._tower(half, pool) for half in maps.chunk(2))
+        return pool(functional.relu(self.conv4_gray(gray) + self.conv4_disparity(disparity)))
+
+    def _tower(self, maps: Tensor, pool: Pool) -> Tensor:
+        """Return the three convolutions that both layers go through."""
+        for conv in (self.conv1, self.conv2, self.conv3):
+            maps = pool(functional.relu(conv(maps)))
+        return maps
+
+    def _head(self, features: Tensor) -> Tensor:
+        logits: Tensor = self.out(functional.relu(self.fc(features)))
+        return logits
+
+
+def fragments(maps: Tensor) -> Tensor:
+    """Pool 2 x 2 at the four offsets (0, 0), (0, 1), (1, 0), (1, 1).
+
+    Args:
+        maps: (B, C, H, W).
+
+    Returns:
+        (4 B, C, H // 2, W // 2), the four offsets one after another. At an even size, the last row and
+        column of the shifted fragments are made of one repeated row and column; ``dense`` cuts them off.
+    """
+    height, width = maps.shape[2:]
+    padded = functional.pad(maps, (0, 1 - width % 2, 0, 1 - height % 2), mode="replicate")
+    rows, columns = (height // 2) * 2, (width // 2) * 2
+    shifted = [padded[:, :, y : y + rows, x : x + columns] for y in (0, 1) for x in (0, 1)]
+    return torch.cat([functional.max_pool2d(part, 2) for part in shifted])
+
+
+def interleave(values: Tensor) -> Tensor:
+    """Undo four rounds of ``fragments``: (256, H, W) -> (16 H, 16 W).
+
+    The offsets of the last pooling come first in the batch and weigh most: 8, 4, 2, 1 pixels.
+    """
+    height, width = values.shape[1:]
+    offsets = values.reshape(2, 2, 2, 2, 2, 2, 2, 2, height, width)  # y8 x8 y4 x4 y2 x2 y1 x1 H W
+    return offsets.permute(8, 0, 2, 4, 6, 9, 1, 3, 5, 7).reshape(STRIDE * height, STRIDE * width)

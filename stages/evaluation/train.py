@@ -1,0 +1,84 @@
+"""Training the evaluation-Net on grids of pixels of the training scenes' raw maps."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from stages.augmentation import relight
+from stages.evaluation.declaration import PATCH, RADIUS, STRIDE, EvaluationNetParams
+from stages.evaluation.layers import evaluation_layers
+from stages.evaluation.net import EvaluationNet
+from stages.parameters import initialise, to_vector
+from stages.precision import autocast
+from stages.schedule import SHARDS
+from stages.stage import Arrays, Inputs, Monitor, Silent, by_scene
+from stages.training import balanced_cross_entropy, fit
+
+
+def train_evaluation_net(
+    params: EvaluationNetParams, inputs: Inputs, monitor: Monitor | None = None
+) -> dict[str, NDArray[np.float32]]:
+    """Train an evaluation-Net from nothing.
+
+    Args:
+        params: schedule and augmentation.
+        inputs: ``images`` and ``disparity`` of every training scene, and ``evaluation_samples``.
+        monitor: progress and checkpoints.
+
+    Returns:
+        ``parameters`` float32 (parameter,) and ``loss`` float32 (step,).
+    """
+    pairs = zip(by_scene(inputs, "images"), by_scene(inputs, "disparity"), strict=True)
+    scenes = [_layers(images, disparity) for images, disparity in pairs]
+    net = EvaluationNet().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    initialise(net, params.seed)
+    samples = inputs["evaluation_samples"]
+
+    def loss(step: int, shard: int) -> Tensor:
+        rng = np.random.default_rng((params.seed, step, shard))
+        first = step * params.batch + shard
+        chosen = [index % len(samples["scene"]) for index in range(first, (step + 1) * params.batch, SHARDS)]
+        crops = np.stack([_crop(params, samples, index, scenes, rng) for index in chosen])
+        labels = torch.from_numpy(samples["labels"][chosen].astype(np.int64))
+        with autocast(params.precision):
+            logits = _upright(net, crops, params.flip and bool(rng.random() < 0.5))
+        return balanced_cross_entropy(logits.permute(1, 0, 2, 3).reshape(2, -1), labels.reshape(-1))
+
+    curve = fit(net, loss, params, monitor or Silent())
+    return {"parameters": to_vector(net), "loss": curve}
+
+
+def _layers(images: Arrays, disparity: Arrays) -> NDArray[np.float32]:
+    """Return the layers of one scene."""
+    return evaluation_layers(images["left"], images["moments"][0], disparity["disparity"])
+
+
+def _crop(
+    params: EvaluationNetParams,
+    samples: Arrays,
+    index: int,
+    scenes: Sequence[NDArray[np.float32]],
+    rng: np.random.Generator,
+) -> NDArray[np.float32]:
+    """Cut out what the grid of sample ``index`` depends on; beyond the image the nearest pixel, as in inference."""
+    scene = scenes[int(samples["scene"][index])]
+    rows, columns = (
+        np.clip(np.arange(first - RADIUS, first - RADIUS + PATCH + STRIDE * (count - 1)), 0, length - 1)
+        for first, count, length in zip(
+            (int(samples["y"][index]), int(samples["x"][index])),
+            samples["labels"].shape[1:],
+            scene.shape[1:],
+            strict=True,
+        )
+    )
+    return relight(scene[:, rows[:, None], columns], params.relight, rng)
+
+
+def _upright(net: EvaluationNet, crops: NDArray[np.float32], flipped: bool) -> Tensor:
+    """Return the logits of crops; flipped, of the crops upside down, in the order of the upright ones."""
+    layers = torch.from_numpy(crops[:, :, ::-1].copy() if flipped else crops)
+    logits: Tensor = net(layers.contiguous(memory_format=torch.channels_last))
+    return logits.flip(2) if flipped else logits

@@ -1,0 +1,117 @@
+"""What the matching-Net's three products are made from, and what can be set. Light: it does not load torch."""
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from stages.precision import Precision
+from stages.schedule import SHARDS, Schedule
+from stages.stage import Output, Params, Stage, StageError
+
+Form = Literal["dense", "patch"]
+Head = Literal["compact", "paper"]
+PATCH = 11
+"""Side of the square patch that one answer of the matching-Net depends on, in pixels."""
+RADIUS = PATCH // 2
+
+
+class MatchingSamplesParams(Params):
+    """What the matching-Net learns from."""
+
+    form: Form = Field("dense", description="dense crops, or the paper's patches")
+    samples: int = Field(6000, ge=1, description="samples in all, over the scenes in equal parts")
+    height: int = Field(24, ge=1, le=256, description="rows of a dense crop, px")
+    width: int = Field(40, ge=1, le=256, description="columns of a dense crop, px")
+    slots: int = Field(12, ge=3, le=64, description="disparities a dense crop is compared at")
+    mirror: bool = Field(True, description="mirror half of the samples where the right view has a truth")
+    seed: int = Field(0, ge=0, description="seed of the draw")
+
+    @property
+    def crop(self) -> tuple[int, int]:
+        """Rows and columns of a sample."""
+        return (1, 1) if self.form == "patch" else (self.height, self.width)
+
+    @property
+    def disparities(self) -> int:
+        """Disparities of a sample."""
+        return 2 if self.form == "patch" else self.slots
+
+
+class MatchingNetParams(Schedule):
+    """The matching-Net and how it is trained."""
+
+    head: Head = Field("compact", description="hidden layers: 128 units, or the paper's 1600 and 128")
+    batch: int = Field(4, ge=SHARDS, description="samples a step; a multiple of the number of shards")
+    relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting a view; 0: none, as the paper")
+    precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
+    seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
+
+
+class CostVolumeParams(Params):
+    """Which cells are computed, and in which arithmetic."""
+
+    d_min: int | None = Field(None, description="smallest disparity, px; default: the scene's own")
+    d_max: int | None = Field(None, description="largest disparity, px; default: the scene's own")
+    precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
+
+    @property
+    def disparities(self) -> range:
+        """The disparities of the volume, once both ends are known.
+
+        Raises:
+            StageError: if one is not.
+        """
+        if self.d_min is None or self.d_max is None:
+            raise StageError("the cost volume needs a disparity range: give d_min and d_max")
+        return range(self.d_min, self.d_max + 1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "CostVolumeParams":
+        if self.d_min is not None and self.d_max is not None and self.d_max < self.d_min:
+            raise ValueError(f"d_max {self.d_max} lies below d_min {self.d_min}")
+        return self
+
+
+MATCHING_SAMPLES = Stage(
+    product="matching_samples",
+    inputs=("truth",),
+    outputs=(
+        Output("scene", ("sample",), "int32", "1", "training scene, in the order of the split"),
+        Output("mirrored", ("sample",), "bool", "1", "views flipped and exchanged"),
+        Output("y", ("sample",), "int32", "px", "top row of the crop"),
+        Output("x", ("sample",), "int32", "px", "left column of the crop"),
+        Output("disparities", ("sample", "slot"), "int32", "px", "disparities the crop is compared at"),
+        Output("truth", ("sample", "row", "column"), "float32", "px", "true disparity where both views see the pixel"),
+    ),
+    compute="stages.matching.samples:draw_samples",
+    params=MatchingSamplesParams,
+    scope="split",
+)
+
+MATCHING_NET = Stage(
+    product="matching_net",
+    inputs=("matching_samples", "channels"),
+    outputs=(
+        Output("parameters", ("parameter",), "float32", "1", "weights and channel scales of the matching-Net"),
+        Output("loss", ("step",), "float32", "1", "class-balanced cross-entropy of each training step"),
+    ),
+    compute="stages.matching.train:train_matching_net",
+    params=MatchingNetParams,
+    scope="split",
+    monitored=True,
+)
+
+COST_VOLUME = Stage(
+    product="costvolume",
+    inputs=("channels", "matching_net"),
+    outputs=(
+        Output("cost", ("y", "x", "d"), "float16", "1", "log-odds of a mismatch; lower is better", {"x": 256}),
+        Output("d", ("d",), "int16", "px", "disparity: x_right = x_left - d"),
+    ),
+    compute="stages.matching.cost_volume:compute_costs",
+    params=CostVolumeParams,
+    tile_rows=32,
+    halo=lambda _: RADIUS,
+    border="edge",
+    sizes=lambda params: {"d": len(params.disparities)},
+)

@@ -1,0 +1,109 @@
+"""Training samples of the matching-Net: where to look in the training scenes, and at which disparities.
+
+A sample is a crop of the left view with the disparities at which it is compared. Both of the forms
+of training are of this kind, and a cell's label follows from the truth in either:
+within 0.5 px of it a match, more than 1 px away a mismatch, between them nothing.
+
+* ``patch``, the paper's: a crop of one pixel with two disparities, the nearest to the truth and a
+  random other one more than 1 px away.
+* ``dense``: a larger crop; some disparities are those of pixels in the crop (so that there are
+  matches), some lie just beside them (the mismatches that are hardest to tell), the rest anywhere.
+
+Where the right view has ground truth, half the samples are *mirrored*: both views flipped and
+exchanged, which is again a rectified pair.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.matching.declaration import MatchingSamplesParams
+from stages.stage import Arrays, Inputs, StageError, by_scene
+
+NEAR = 6
+"""Largest distance from the truth, in pixels, of a mismatch that is drawn beside it."""
+
+
+def visible_truth(truth: Arrays, mirrored: bool) -> NDArray[np.float32]:
+    """Return the disparity of the pixels seen in both views, NaN elsewhere: float32 (y, x).
+
+    Mirrored, it is that of the right view, flipped: the left view of the mirrored pair.
+    """
+    if mirrored:
+        return np.where(truth["right_nonocc"], truth["right_disparity"], np.float32(np.nan))[:, ::-1]
+    return np.where(truth["nonocc"], truth["disparity"], np.float32(np.nan))
+
+
+def draw_samples(params: MatchingSamplesParams, inputs: Inputs) -> dict[str, NDArray[np.generic]]:
+    """Draw the samples of all training scenes, in random order.
+
+    Returns:
+        ``scene`` int32, ``mirrored`` bool, ``y`` and ``x`` int32 (sample,): the crop's top left pixel;
+        ``disparities`` int32 (sample, slot), px; ``truth`` float32 (sample, row, column), px, NaN where
+        a cell teaches nothing.
+
+    Raises:
+        StageError: if a crop does not fit into a scene, or a scene has no pixel to learn from.
+    """
+    rng = np.random.default_rng(params.seed)
+    scenes = by_scene(inputs, "truth")
+    order = rng.permutation(np.arange(params.samples) % len(scenes))
+    drawn = [_draw(params, scenes[scene], rng) for scene in order]
+    columns = {name: np.stack([sample[name] for sample in drawn]) for name in drawn[0]}
+    return {"scene": order.astype(np.int32), **columns}
+
+
+def _draw(params: MatchingSamplesParams, truth: Arrays, rng: np.random.Generator) -> dict[str, NDArray[np.generic]]:
+    """Draw one sample of one scene, around a pixel whose truth is known."""
+    mirrored = params.mirror and bool(np.any(truth["right_nonocc"])) and bool(rng.random() < 0.5)
+    visible = visible_truth(truth, mirrored)
+    y, x = _corner(visible, params.crop, rng)
+    crop = visible[y : y + params.crop[0], x : x + params.crop[1]]
+    known = crop[np.isfinite(crop)]
+    low, high = (int(bound) for bound in truth["range"])
+    pick = _patch_slots if params.form == "patch" else _dense_slots
+    slots = pick(known, low, high, params.disparities, rng)
+    return {
+        "mirrored": np.array(mirrored),
+        "y": np.array(y, np.int32),
+        "x": np.array(x, np.int32),
+        "disparities": slots.astype(np.int32),
+        "truth": np.ascontiguousarray(crop, np.float32),
+    }
+
+
+def _corner(visible: NDArray[np.float32], crop: tuple[int, int], rng: np.random.Generator) -> tuple[int, int]:
+    """Return the corner of a crop that holds a random pixel of known truth, at a random place in the crop."""
+    candidates = np.flatnonzero(np.isfinite(visible))
+    if not len(candidates):
+        raise StageError("a training scene has no pixel with a known disparity that both views see")
+    spare = np.array(visible.shape) - crop
+    if (spare < 0).any():
+        raise StageError(f"a crop of {crop} px does not fit into a training scene of {visible.shape} px")
+    pixel = np.array(np.unravel_index(rng.choice(candidates), visible.shape))
+    y, x = np.clip(pixel - rng.integers(0, crop), 0, spare)
+    return int(y), int(x)
+
+
+def _patch_slots(
+    known: NDArray[np.float32], low: int, high: int, _: int, rng: np.random.Generator
+) -> NDArray[np.int64]:
+    """Return the disparity nearest to the truth, and a random one more than 1 px from it."""
+    others = np.arange(low, high + 1)
+    others = others[np.abs(others - known[0]) > 1]
+    if not len(others):
+        raise StageError(f"the range {low}..{high} px has no mismatch for a truth of {known[0]:.2f} px")
+    slots: NDArray[np.int64] = np.array([np.rint(known[0]), rng.choice(others)], np.int64)
+    return slots
+
+
+def _dense_slots(
+    known: NDArray[np.float32], low: int, high: int, count: int, rng: np.random.Generator
+) -> NDArray[np.int64]:
+    """Return a third of disparities found in the crop, a sixth beside such ones, the rest from the whole range."""
+    found = np.rint(rng.choice(known, count // 3))
+    beside = np.rint(rng.choice(known, count // 6)) + rng.choice((-1, 1), count // 6) * rng.integers(
+        2, NEAR + 1, count // 6
+    )
+    anywhere = rng.integers(low, high + 1, count - len(found) - len(beside))
+    slots: NDArray[np.int64] = np.clip(np.concatenate([found, beside, anywhere]), low, high).astype(np.int64)
+    return slots

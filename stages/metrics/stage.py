@@ -1,0 +1,118 @@
+"""The figures of one scene: the product ``metrics`` and its rows for machines."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.metrics.confidence import Ranking, optimal_auc
+from stages.metrics.errors import QUANTILES, Errors, counted, require_equal
+from stages.stage import Array, Arrays, Inputs, NoParams, Output, Stage
+
+MASKS = ("nonocc", "all")
+"""The order of the mask axis: pixels visible in both views, and all pixels; both only where the truth is known."""
+THRESHOLDS = (0.5, 1.0, 2.0, 4.0)
+"""The order of the threshold axis, px of the image at hand."""
+
+DIMS = ("mask", "threshold")
+FIGURES = {
+    "pixels": ("int64", "1", "pixels of the mask with a known truth"),
+    "raw_bad": ("float64", "%", "wrong or unreported pixels of the map before filtering"),
+    "bad": ("float64", "%", "wrong pixels among those the filtered map reports"),
+    "invalid": ("float64", "%", "pixels that the filtered map does not report"),
+    "avgerr": ("float64", "px", "mean absolute error of the filtered map"),
+    "rms": ("float64", "px", "root mean squared error of the filtered map"),
+    **{
+        name: ("float64", "px", f"error that {share:.0%} of the filtered map keep to")
+        for name, share in QUANTILES.items()
+    },
+    "auc": ("float64", "1", "area under the error curve of the confidence over the map before filtering"),
+    "auc_optimal": ("float64", "1", "the area that a perfect confidence would reach"),
+}
+"""Every figure of the product: dtype, unit, meaning. Those that know no threshold are the same at each."""
+ROW = ("raw_bad", "bad", "invalid", "avgerr", "rms", "auc", "auc_optimal")
+"""The figures of a machine-readable row, in order."""
+
+
+def metric_rows(scene: str, method: str, R: float | None, arrays: Arrays) -> list[dict[str, Any]]:
+    """Return the product as rows for scripts, one for each mask and threshold.
+
+    Args:
+        scene: name of the scene.
+        method: name of the method that made the map.
+        R: least confidence kept, None for a method that has none.
+        arrays: the product ``metrics``.
+
+    Returns:
+        Rows ``scene, method, mask, threshold_px, R, pixels, raw_bad, bad, invalid, avgerr, rms, auc, auc_optimal``:
+        errors in percent (0-100), ``avgerr`` and ``rms`` in px, areas as fractions. A key whose figure does not apply
+        (NaN, or R None) is absent.
+    """
+    return [
+        {"scene": scene, "method": method, "mask": mask, "threshold_px": float(threshold)}
+        | ({} if R is None else {"R": R})
+        | {"pixels": int(arrays["pixels"][m, t])}
+        | {name: float(arrays[name][m, t]) for name in ROW if not np.isnan(arrays[name][m, t])}
+        for m, mask in enumerate(MASKS)
+        for t, threshold in enumerate(arrays["threshold"])
+    ]
+
+
+def compute_metrics(_: NoParams, inputs: Inputs) -> Arrays:
+    """Compute the product ``metrics``: each of ``FIGURES`` for each of ``MASKS`` and ``THRESHOLDS``.
+
+    Raises:
+        StageError: if a map has not the shape of the ground truth.
+    """
+    maps = {
+        "semidense": inputs["semidense"]["disparity"],
+        "disparity": inputs["disparity"]["disparity"],
+        "confidence": inputs["confidence"]["confidence"],
+        "nonocc": inputs["truth"]["nonocc"],
+    }
+    truth: Array = inputs["truth"]["disparity"]
+    for name, array in maps.items():
+        require_equal(name, array, truth)
+    masks = (maps.pop("nonocc"), np.ones(truth.shape, bool))
+    table = [list(_figures(**maps, truth=truth, mask=mask)) for mask in masks]
+    return {
+        "threshold": np.array(THRESHOLDS),
+        **{name: np.array([[cell[name] for cell in row] for row in table], FIGURES[name][0]) for name in FIGURES},
+    }
+
+
+def _figures(
+    semidense: Array, disparity: Array, confidence: Array, truth: Array, mask: NDArray[np.bool_]
+) -> Iterator[dict[str, float]]:
+    """Yield the figures of one mask at each threshold."""
+    raw, filtered = Errors.of(disparity, truth, mask), Errors.of(semidense, truth, mask)
+    ranking = Ranking.of(confidence[counted(truth, mask)])
+    same: dict[str, float] = {
+        "pixels": raw.absolute.size,
+        "invalid": filtered.invalid(),
+        "avgerr": filtered.avgerr(),
+        "rms": filtered.rms(),
+        **filtered.quantiles(),
+    }
+    for threshold in THRESHOLDS:
+        raw_bad = raw.raw_bad(threshold)
+        yield same | {
+            "raw_bad": raw_bad,
+            "bad": filtered.bad(threshold),
+            "auc": ranking.auc(raw.absolute <= threshold),
+            "auc_optimal": optimal_auc(raw_bad / 100),
+        }
+
+
+METRICS = Stage(
+    product="metrics",
+    inputs=("semidense", "disparity", "confidence", "truth"),
+    outputs=(
+        Output("threshold", ("threshold",), "float64", "px", "error above which a pixel is wrong"),
+        *(Output(name, DIMS, *about) for name, about in FIGURES.items()),
+    ),
+    compute="stages.metrics.stage:compute_metrics",
+)
+"""The figures of a scene, masks in the order of ``MASKS``. ``truth`` has ``disparity`` (y, x) float32, NaN unknown, and
+``nonocc`` (y, x) bool. Not tiled: a quantile and a ranking are not sums over tiles."""

@@ -1,0 +1,155 @@
+"""What a stage is: one frozen declaration and one pure function over arrays.
+
+A stage knows nothing of paths, stores or schedulers. The runner reads the declaration, cuts the
+inputs into tiles, adds the halo, calls ``compute`` and writes what it returns. So *tile == whole*
+can be tested, and any stage runs in a notebook without the rest.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+Array = NDArray[Any]
+Arrays = Mapping[str, Array]
+"""The arrays of one product, by name."""
+Inputs = Mapping[str, Any]
+"""What ``compute`` is given: product name -> its arrays (for a split stage: one ``Arrays`` a scene)."""
+Scope = Literal["scene", "split"]
+Border = Literal["cut", "edge"]
+
+
+class StageError(ValueError):
+    """A stage was given arrays or parameters that it cannot work on."""
+
+
+class Params(BaseModel):
+    """One section of the configuration: exactly the fields that enter the keys of its stage."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+
+
+class NoParams(Params):
+    """The section of a stage that has nothing to set."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """One array of a product.
+
+    Attributes:
+        name: its name in the product's dataset.
+        dims: dimension names, in order; ``y`` and ``x`` are the image's rows and columns.
+        dtype: NumPy dtype name, as stored; None: as computed.
+        units: physical unit (``px``, ``1`` for a pure number).
+        about: one line for people, stored as ``long_name``.
+        chunks: chunk length by dimension; a dimension not named is one chunk. On a tiled stage
+            the runner sets ``y`` to the tile's rows, so that a tile writes whole chunks.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    dtype: str | None
+    units: str
+    about: str
+    chunks: Mapping[str, int] = field(default_factory=dict)
+
+
+class Monitor(Protocol):
+    """What long work is given to report to and to resume from."""
+
+    def progress(self, done: int, total: int, note: str = "") -> None:
+        """Say how far the work is: ``done`` of ``total`` steps, with a short note such as the loss."""
+
+    def save(self, state: bytes) -> None:
+        """Keep a checkpoint from which ``load`` lets a later call go on."""
+
+    def load(self) -> bytes | None:
+        """Return the latest checkpoint, or None."""
+
+
+class Silent:
+    """A monitor for notebooks and tests: reports nothing, keeps nothing."""
+
+    def progress(self, done: int, total: int, note: str = "") -> None:
+        """Say nothing."""
+
+    def save(self, state: bytes) -> None:
+        """Keep nothing."""
+
+    def load(self) -> bytes | None:
+        """Return None: there is never a checkpoint."""
+        return None
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The declaration of a stage.
+
+    Attributes:
+        product: what it makes; the name that ``--upto`` takes.
+        inputs: products it is made from.
+        outputs: the arrays of the product.
+        compute: ``module:function`` of ``compute(params, inputs) -> {array name: array}``; with
+            ``monitored``, a ``monitor`` is passed as a third argument. A name, so that planning and
+            looking at the cache do not load torch.
+        params: the section of the configuration whose fields enter the key.
+        scope: ``scene`` (one product a scene) or ``split`` (one for all training scenes).
+        tile_rows: rows a tile; None if it needs the whole image at once.
+        halo: pixels of context that a tile needs on each side, from the parameters.
+        border: what a tile sees beyond the image. ``cut``: nothing, the block ends at the image
+            and the output has the block's size (the runner trims the halo). ``edge``: the nearest
+            pixel, always ``halo`` wide on all four sides, and the output is smaller by the halo.
+        sizes: of a tiled stage, the length of each dimension other than ``y`` and ``x``, from the
+            parameters: its arrays exist before its first tile.
+        monitored: long work, which reports progress and can resume.
+    """
+
+    product: str
+    inputs: tuple[str, ...]
+    outputs: tuple[Output, ...]
+    compute: str
+    params: type[Params] = NoParams
+    scope: Scope = "scene"
+    tile_rows: int | None = None
+    halo: Callable[[Any], int] = lambda _: 0
+    border: Border = "cut"
+    sizes: Callable[[Any], Mapping[str, int]] = lambda _: {}
+    monitored: bool = False
+
+    @property
+    def module(self) -> str:
+        """Name of the module whose code, with all it imports, makes the product."""
+        return self.compute.partition(":")[0]
+
+    def function(self) -> Callable[..., Arrays]:
+        """Import and return the function that ``compute`` names."""
+        module, _, name = self.compute.partition(":")
+        function: Callable[..., Arrays] = getattr(import_module(module), name)
+        return function
+
+
+def by_scene(inputs: Inputs, product: str) -> Sequence[Arrays]:
+    """Return a split stage's input as a sequence with one ``Arrays`` a training scene.
+
+    Raises:
+        StageError: if there is no training scene.
+    """
+    scenes: Sequence[Arrays] = inputs[product]
+    if not scenes:
+        raise StageError(f"no training scene has {product!r}: name a dataset with a training split")
+    return scenes
+
+
+def require_shape(name: str, array: Array, ndim: int) -> None:
+    """Refuse an array of another number of dimensions.
+
+    Raises:
+        StageError: naming the array, its shape and what was expected.
+    """
+    if np.ndim(array) != ndim:
+        raise StageError(f"{name} has shape {np.shape(array)}, expected {ndim} dimensions")

@@ -1,0 +1,119 @@
+"""The training loop that both networks share: Adam, a falling rate, exact resume.
+
+A step's loss is the mean over a fixed number of *shards*, each computed by one thread on one core,
+and the gradients are added in the shards' order. So the result does not depend on how many cores
+there are, and two cores work without sharing one operation (which measures slower).
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import cast
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from safetensors.torch import load as load_tensors
+from safetensors.torch import save as save_tensors
+from torch import Tensor, nn
+from torch.nn import functional
+
+from stages.allocator import keep_freed_memory
+from stages.schedule import SHARDS, Schedule
+from stages.stage import Monitor, StageError
+
+Loss = Callable[[int, int], Tensor]
+"""``loss(step, shard)``: the scalar loss of one shard of one step, a pure function of the two numbers."""
+
+
+def balanced_cross_entropy(logits: Tensor, labels: Tensor) -> Tensor:
+    """Return the cross-entropy with both classes of the same weight, however many samples each has.
+
+    Args:
+        logits: (2, N), of class 0 and class 1.
+        labels: int64 (N,): 0, 1, or -1 for what teaches nothing. A class without samples adds nothing.
+    """
+    counts = torch.stack([(labels == label).sum() for label in (0, 1)]).clamp(min=1)
+    return functional.cross_entropy(logits.float().T, labels, 0.5 / counts, ignore_index=-1, reduction="sum")
+
+
+def one_thread() -> None:
+    """Make torch use one thread an operation in the calling thread."""
+    torch.set_num_threads(1)
+
+
+def fit(net: nn.Module, loss: Loss, schedule: Schedule, monitor: Monitor) -> NDArray[np.float32]:
+    """Train ``net`` in place and return the loss of each step.
+
+    A checkpoint holds the parameters, Adam's moments and the curve so far; since ``loss`` is a pure
+    function of step and shard, a resumed training gives bit for bit what an undisturbed one gives.
+
+    Args:
+        net: the network; its parameters are changed.
+        loss: the loss of one shard of one step.
+        schedule: steps, rates and clipping.
+        monitor: told of progress, keeps and gives back checkpoints.
+
+    Returns:
+        float32 (step,): the mean loss of each step, before its update.
+
+    Raises:
+        StageError: if the loss is not finite.
+    """
+    keep_freed_memory()
+    parameters = list(net.parameters())
+    optimiser = torch.optim.Adam(parameters, lr=schedule.first_rate)
+    curve = _resume(net, optimiser, monitor.load())
+    with ThreadPoolExecutor(SHARDS, initializer=one_thread) as pool:
+        for step in range(len(curve), schedule.steps):
+            curve.append(_step(parameters, optimiser, loss, step, schedule, pool))
+            monitor.progress(step + 1, schedule.steps, f"loss {np.mean(curve[-50:]):.4f}")
+            if (step + 1) % schedule.checkpoint_steps == 0:
+                monitor.save(_checkpoint(net, optimiser, curve))
+    return np.array(curve, np.float32)
+
+
+def _step(
+    parameters: Sequence[Tensor],
+    optimiser: torch.optim.Optimizer,
+    loss: Loss,
+    step: int,
+    schedule: Schedule,
+    pool: ThreadPoolExecutor,
+) -> float:
+    """Take one step and return its loss."""
+
+    def shard_gradients(shard: int) -> tuple[float, tuple[Tensor, ...]]:
+        value = loss(step, shard)
+        # Not backward(): two threads would add into the same .grad in an order nobody fixed.
+        return value.item(), torch.autograd.grad(value, parameters)
+
+    parts = list(pool.map(shard_gradients, range(SHARDS)))
+    value = float(np.mean([part[0] for part in parts]))
+    if not np.isfinite(value):
+        raise StageError(f"the loss is {value} at step {step}: lower the learning rate or look at the samples")
+    for parameter, *gradients in zip(parameters, *(part[1] for part in parts), strict=True):
+        parameter.grad = cast(Tensor, sum(gradients)) / SHARDS
+    nn.utils.clip_grad_norm_(parameters, schedule.clip)
+    optimiser.param_groups[0]["lr"] = schedule.rate(step)
+    optimiser.step()
+    return value
+
+
+def _checkpoint(net: nn.Module, optimiser: torch.optim.Adam, curve: list[float]) -> bytes:
+    tensors = {f"net.{name}": tensor for name, tensor in net.state_dict().items()}
+    for index, state in enumerate(optimiser.state.values()):
+        tensors |= {f"adam.{index}.{name}": tensor for name, tensor in state.items()}
+    tensors["curve"] = torch.tensor(curve, dtype=torch.float64)
+    return save_tensors({name: tensor.contiguous() for name, tensor in tensors.items()})
+
+
+def _resume(net: nn.Module, optimiser: torch.optim.Adam, checkpoint: bytes | None) -> list[float]:
+    """Put ``net`` and ``optimiser`` where the checkpoint left them; return the curve so far."""
+    if checkpoint is None:
+        return []
+    tensors = load_tensors(checkpoint)
+    net.load_state_dict({name: tensors[f"net.{name}"] for name in net.state_dict()})
+    for index, parameter in enumerate(net.parameters()):
+        names = ("step", "exp_avg", "exp_avg_sq")
+        optimiser.state[parameter] = {name: tensors[f"adam.{index}.{name}"] for name in names}
+    return [float(value) for value in tensors["curve"]]

@@ -1,0 +1,1 @@
+"""What the matching network sees of an image: gray values, rank transform, companion transform."""

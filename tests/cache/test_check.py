@@ -1,0 +1,250 @@
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cache import DamagedEntry, Entry, Recipe, Store
+from cache.check import SETTLED, Policy, _hashed
+from cache.document import seal, unseal
+from cache.files import walk
+
+
+def overwrite(path: Path, data: bytes) -> None:
+    path.chmod(0o600)
+    path.write_bytes(data)
+
+
+def files_of(store: Store, key: str) -> dict[str, Path]:
+    folder = store.layout.entry(key)
+    files = {path: folder / path for path, thing in walk(folder) if thing.is_file()}
+    return {**files, "record": store.layout.record(key)}
+
+
+def test_a_flipped_bit_at_every_offset_is_found(store: Store, make: Callable[..., Entry], recipe: Recipe) -> None:
+    make(store)
+    trials = 0
+    for name, path in files_of(store, recipe.key).items():
+        good = path.read_bytes()
+        path.chmod(0o600)
+        for offset in range(len(good)):
+            bad = bytearray(good)
+            bad[offset] ^= 1 << offset % 8
+            with path.open("r+b") as file:
+                file.write(bad)
+            assert store.check(recipe.key) is not None, f"{name} at {offset}"
+            trials += 1
+        overwrite(path, good)
+        assert store.check(recipe.key) is None
+    assert trials > 2000
+
+
+@pytest.mark.parametrize("policy", ["size", "off"])
+def test_a_flipped_bit_in_a_chunk_never_reads_as_another_value_even_unchecked(
+    store: Store, make: Callable[..., Entry], recipe: Recipe, values: np.ndarray, policy: Policy
+) -> None:
+    make(store)
+    unchecked = Store(store.root, policy)
+    path = store.layout.entry(recipe.key) / "data.zarr/map/c/0/0"
+    good = path.read_bytes()
+    refused = 0
+    for offset in range(len(good)):
+        bad = bytearray(good)
+        bad[offset] ^= 1 << offset % 8
+        overwrite(path, bytes(bad))
+        try:
+            read = unchecked.open(recipe.key)["map"].values
+        except Exception:  # noqa: BLE001 - whatever the codec says, it is an error
+            refused += 1
+        else:
+            np.testing.assert_array_equal(read, values)
+    assert refused > len(good) // 2
+
+
+Damage = Callable[[Path, Path], None]
+"""Does something to an entry's folder and record."""
+
+
+def _chunk(folder: Path, number: int = 0) -> Path:
+    return folder / f"data.zarr/map/c/{number}/0"
+
+
+def _swap(folder: Path, _: Path) -> None:
+    _chunk(folder).rename(folder / "x")
+    _chunk(folder, 1).rename(_chunk(folder))
+    (folder / "x").rename(_chunk(folder, 1))
+
+
+def _link(folder: Path, _: Path) -> None:
+    shutil.copy(_chunk(folder), folder.parent / "copy")
+    _chunk(folder).unlink()
+    _chunk(folder).symlink_to(folder.parent / "copy")
+
+
+def _link_folder(folder: Path, _: Path) -> None:
+    shutil.copytree(folder / "data.zarr/map", folder.parent / "copy")
+    shutil.rmtree(folder / "data.zarr/map")
+    (folder / "data.zarr/map").symlink_to(folder.parent / "copy")
+
+
+def _link_entry(folder: Path, _: Path) -> None:
+    folder.rename(folder.with_name("copy"))
+    folder.symlink_to(folder.with_name("copy"))
+
+
+def _fifo(folder: Path, _: Path) -> None:
+    _chunk(folder).unlink()
+    os.mkfifo(_chunk(folder))
+
+
+def _manifest_with_its_own_checksum(folder: Path, _: Path) -> None:
+    path = folder / "manifest.json"
+    rows = unseal("manifest", path.read_bytes())["files"]
+    overwrite(path, seal("manifest", {"files": rows[1:]}))
+    _chunk(folder).unlink()
+    _chunk(folder).parent.rmdir()
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        pytest.param(lambda f, r: overwrite(_chunk(f), _chunk(f).read_bytes()[:-1]), id="truncated chunk"),
+        pytest.param(lambda f, r: overwrite(_chunk(f), b""), id="empty chunk"),
+        pytest.param(lambda f, r: overwrite(_chunk(f), _chunk(f).read_bytes() + b"\0"), id="appended to a chunk"),
+        pytest.param(lambda f, r: _chunk(f).unlink(), id="deleted chunk"),
+        pytest.param(lambda f, r: shutil.copy(_chunk(f), _chunk(f).with_name("1")), id="extra chunk"),
+        pytest.param(lambda f, r: (f / "notes").write_text("x"), id="extra file"),
+        pytest.param(lambda f, r: (f / "data.zarr/empty").mkdir(), id="extra folder"),
+        pytest.param(lambda f, r: (f / "data.zarr/here").symlink_to("/"), id="extra link"),
+        pytest.param(_swap, id="swapped chunks of different size"),
+        pytest.param(_link, id="link to the very same bytes"),
+        pytest.param(_link_folder, id="link to the very same folder"),
+        pytest.param(_link_entry, id="link in place of the entry"),
+        pytest.param(_fifo, id="a pipe, which would wait for ever"),
+        pytest.param(lambda f, r: (f / "manifest.json").unlink(), id="no manifest"),
+        pytest.param(lambda f, r: overwrite(f / "manifest.json", b""), id="empty manifest"),
+        pytest.param(_manifest_with_its_own_checksum, id="manifest and files edited alike"),
+        pytest.param(lambda f, r: f.rename(f.with_name("gone")), id="no entry"),
+        pytest.param(lambda f, r: overwrite(r, r.read_bytes()[:-1]), id="truncated record"),
+        pytest.param(lambda f, r: overwrite(r, bytes(len(r.read_bytes()))), id="zeroed record"),
+        pytest.param(lambda f, r: overwrite(r, r.read_bytes().replace(b"Teddy", b"Cones")), id="edited label"),
+        pytest.param(lambda f, r: overwrite(r, r.read_bytes().replace(b'mat": 1', b'mat": 2')), id="newer format"),
+        pytest.param(lambda f, r: overwrite(r, r.read_bytes().replace(b'mat": 1', b'mat": 0')), id="older format"),
+        pytest.param(lambda f, r: (r.rename(f.parent / "r"), r.symlink_to(f.parent / "r")), id="record is a link"),
+        pytest.param(lambda f, r: (r.unlink(), r.mkdir()), id="record is a folder"),
+    ],
+)
+def test_damage_is_found_set_aside_and_made_again(
+    store: Store,
+    make: Callable[..., Entry],
+    recipe: Recipe,
+    damage: Damage,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    first = make(store)
+    store = Store(store.root, "size")  # all that this finds, the full check finds: it begins the same way
+    assert store.require(recipe.key) == first
+    damage(store.layout.entry(recipe.key), store.layout.record(recipe.key))
+    before = sorted(path for path, _ in walk(store.root))
+    said = store.check(recipe.key)
+    assert said is not None
+    assert "\n" not in said
+    assert sorted(path for path, _ in walk(store.root)) == before  # looking changes nothing
+    with pytest.raises(DamagedEntry, match=r"^[^\n]+$"):
+        store.require(recipe.key)
+    assert len(caplog.records) == 1
+    assert store.find(recipe.key) is None
+    assert len(list(store.layout.quarantine.iterdir())) == 1
+    assert make(store).digest == first.digest
+    assert store.require(recipe.key).digest == first.digest
+
+
+def test_same_sized_damage_is_found_by_the_full_check(store: Store, make: Callable[..., Entry], recipe: Recipe) -> None:
+    make(store)
+    path = _chunk(store.layout.entry(recipe.key))
+    overwrite(path, bytes(path.stat().st_size))
+    assert Store(store.root, "size").check(recipe.key) is None
+    assert "are not those that were written" in str(store.check(recipe.key))
+
+
+def test_an_entry_copied_under_another_key(store: Store, make: Callable[..., Entry], recipe: Recipe) -> None:
+    make(store)
+    other = make(store, n=4)
+    for path in (store.layout.record, store.layout.entry):
+        path(other.key).rename(store.root / "old")
+        (shutil.copytree if path(recipe.key).is_dir() else shutil.copy)(path(recipe.key), path(other.key))
+        shutil.rmtree(store.root / "old", ignore_errors=True)
+        (store.root / "old").unlink(missing_ok=True)
+    assert "is the record of" in str(store.check(other.key))
+    assert store.check(recipe.key) is None
+    assert [entry.key for entry in store.entries()] == [recipe.key]
+
+
+def test_data_copied_under_another_key(
+    store: Store, make: Callable[..., Entry], recipe: Recipe, values: np.ndarray
+) -> None:
+    make(store)
+    other = make(store, values + 1, n=4)
+    shutil.rmtree(store.layout.entry(other.key))
+    shutil.copytree(store.layout.entry(recipe.key), store.layout.entry(other.key))
+    assert "its manifest has digest" in str(store.check(other.key))
+
+
+@pytest.fixture
+def hashes(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """The files that were hashed."""
+    from cache import check
+
+    done: list[Path] = []
+
+    def hash_file(path: Path, real: Callable[[Path], str] = check.hash_file) -> str:
+        done.append(path)
+        return real(path)
+
+    monkeypatch.setattr(check, "hash_file", hash_file)
+    _hashed.clear()
+    return done
+
+
+def _age(store: Store, key: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the files' times be long enough ago."""
+    import time
+
+    now = time.time()
+    monkeypatch.setattr("cache.check.time.time", lambda: now + 2 * SETTLED)
+
+
+def test_unchanged_files_are_read_once_a_process(
+    store: Store, make: Callable[..., Entry], recipe: Recipe, hashes: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make(store)
+    _age(store, recipe.key, monkeypatch)
+    store.require(recipe.key)
+    assert len(hashes) == 4
+    Store(store.root).require(recipe.key)
+    assert len(hashes) == 4
+
+
+def test_a_changed_file_is_read_again_though_its_times_are_put_back(
+    store: Store, make: Callable[..., Entry], recipe: Recipe, hashes: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make(store)
+    _age(store, recipe.key, monkeypatch)
+    store.require(recipe.key)
+    path = _chunk(store.layout.entry(recipe.key))
+    times = path.stat().st_mtime_ns
+    overwrite(path, bytes(path.stat().st_size))
+    os.utime(path, ns=(times, times))
+    assert "are not those" in str(store.check(recipe.key))
+
+
+def test_a_file_of_just_now_is_not_remembered(
+    store: Store, make: Callable[..., Entry], recipe: Recipe, hashes: list[Path]
+) -> None:
+    make(store)
+    store.require(recipe.key)
+    assert len(hashes) == 4
+    store.require(recipe.key)
+    assert len(hashes) == 8

@@ -1,0 +1,68 @@
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cache.errors import CacheUnavailable, DamagedEntry
+from cache.files import in_threads, make_folder, remove, walk, write_synced, writing
+
+
+@pytest.mark.parametrize(
+    ("number", "advice"),
+    [
+        (errno.ENOSPC, "No space left on device; free some space"),
+        (errno.EDQUOT, "free some space"),
+        (errno.EROFS, "Read-only file system; choose a cache folder that can be written"),
+        (errno.EACCES, "Permission denied; check its permissions"),
+        (errno.ENOTDIR, "choose another cache folder"),
+        (errno.EFBIG, "File too large; raise the limit"),
+    ],
+)
+def test_failures_are_explained_in_one_line(number: int, advice: str) -> None:
+    line = rf"^cannot write to the cache at /x: [^\n]*{advice}[^\n]*$"
+    with pytest.raises(CacheUnavailable, match=line), writing(Path("/x")):
+        raise OSError(number, os.strerror(number))
+
+
+def test_the_cache_s_own_errors_pass() -> None:
+    with pytest.raises(DamagedEntry, match=r"^mine$"), writing(Path("/x")):
+        raise DamagedEntry("mine")
+
+
+def test_read_only_trees_can_be_removed_and_links_are_not_followed(tmp_path: Path) -> None:
+    outside = tmp_path / "outside"
+    make_folder(outside)
+    write_synced(outside / "kept", b"1")
+    inner = tmp_path / "tree" / "inner"
+    make_folder(inner)
+    write_synced(inner / "file", b"2")
+    (inner / "link").symlink_to(outside)
+    for folder in (inner, inner.parent):
+        folder.chmod(0o555)
+    assert sorted(path for path, _ in walk(tmp_path / "tree")) == ["inner", "inner/file", "inner/link"]
+    remove(tmp_path / "tree")
+    assert sorted(path for path, _ in walk(tmp_path)) == ["outside", "outside/kept"]
+
+
+def test_written_files_are_read_only_and_never_replaced(tmp_path: Path) -> None:
+    write_synced(tmp_path / "file", b"1")
+    assert (tmp_path / "file").stat().st_mode & 0o222 == 0
+    with pytest.raises(FileExistsError):
+        write_synced(tmp_path / "file", b"2")
+
+
+def test_threads_keep_order_and_pass_errors_on() -> None:
+    assert in_threads(lambda x: x * x, range(50)) == [x * x for x in range(50)]
+    with pytest.raises(ZeroDivisionError):
+        in_threads(lambda x: 1 // x, [1, 0])
+
+
+def test_importing_the_cache_is_light() -> None:
+    heavy = "{'numpy', 'zarr', 'xarray', 'dask', 'pandas', 'numcodecs'}"
+    code = f"import sys, cache, cache.verify; print(sorted({heavy} & set(sys.modules)))"
+    project = Path(__file__).parents[2]
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=project, check=True)
+    assert done.stdout.strip() == "[]"

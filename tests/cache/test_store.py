@@ -1,0 +1,241 @@
+import multiprocessing
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+
+import dask
+import numpy as np
+import pytest
+
+from cache import CacheUnavailable, DamagedEntry, Entry, EntryNotFound, InvalidKey, InvalidRecipe, Recipe, Store
+from cache.check import Policy
+from cache.files import walk
+
+
+def test_an_empty_cache_answers_and_makes_nothing(store: Store, recipe: Recipe) -> None:
+    assert store.find(recipe.key) is None
+    assert "no entry has the key" in str(store.check(recipe.key))
+    assert list(store.entries()) == []
+    assert store.history({}) == []
+    assert store.sweep_drafts() == 0
+    with pytest.raises(EntryNotFound, match=r"^no entry has the key"):
+        store.require(recipe.key)
+    assert not store.root.exists()
+
+
+def test_what_was_published_is_found(store: Store, make: Callable[..., Entry], recipe: Recipe) -> None:
+    entry = make(store)
+    assert store.find(recipe.key) == store.require(recipe.key) == entry
+    assert store.check(recipe.key) is None
+    assert (entry.label, entry.seconds, entry.extras) == (
+        {"product": "square", "scene": "Teddy"},
+        1.5,
+        {"version": "0"},
+    )
+    assert (store.root / "CACHEDIR.TAG").read_text().startswith("Signature: 8a477f597d28d172789f06886806bc55")
+    assert store.layout.record(recipe.key) == store.root / "records" / recipe.key[:2] / f"{recipe.key}.json"
+
+
+@pytest.mark.parametrize(
+    "key", ["", "x", "../" * 20, "A" * 64, "0" * 63, "0" * 65, "0" * 64 + "\n", "/etc/passwd", "\u0660" * 64]
+)
+def test_keys_are_never_paths(store: Store, key: str) -> None:
+    for ask in (store.find, store.check, store.require, store.open, store.lock):
+        with pytest.raises(InvalidKey, match="is not a key"):
+            ask(key)
+
+
+def test_an_unknown_policy_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="full, size or off"):
+        Store(tmp_path, "none")  # type: ignore[arg-type]
+
+
+def test_opened_data_are_lazy_labelled_and_exact(store: Store, recipe: Recipe) -> None:
+    with store.begin(recipe, {"scene": "Teddy"}) as draft:
+        draft.create_array("volume", (4, 3), "int16", (2, 3), ("y", "d"), {"units": "s", "long_name": "seconds"}, -1)
+        draft.create_array("d", (3,), "int16", (3,), ("d",), {"units": "px"})
+        draft.write("volume", (slice(None), slice(None)), np.full((4, 3), -1, np.int16))
+        draft.write("d", (slice(None),), np.array([5, 6, 7], np.int16))
+
+    def refuse(*_: object, **__: object) -> None:
+        raise RuntimeError("something was computed")
+
+    with dask.config.set(scheduler=refuse):
+        data = store.open(recipe.key)
+        part = data["volume"].sel(d=6)
+        with pytest.raises(RuntimeError, match="something was computed"):
+            part.values  # noqa: B018
+    assert data["volume"].chunks == ((2, 2), (3,))
+    assert data["volume"].dtype == np.int16
+    assert data["volume"].attrs == {"units": "s", "long_name": "seconds"}
+    assert list(data.coords) == ["d"]
+    np.testing.assert_array_equal(part.values, [-1] * 4)
+    wanted = {"key": recipe.key, "stage": "square", "params": {"n": 3}, "inputs": {"images": "ab"}}
+    assert {name: data.attrs[name] for name in wanted} == wanted
+    assert {"digest", "code", "environment", "label", "created", "seconds", "extras"} < set(data.attrs)
+
+
+@pytest.mark.parametrize("policy", ["full", "size", "off"])
+@pytest.mark.parametrize("damage", [Path.unlink, lambda path: (path.chmod(0o600), path.write_bytes(b"x"))])
+def test_a_chunk_that_vanishes_after_opening_never_reads_as_fill(
+    store: Store, make: Callable[..., Entry], recipe: Recipe, policy: Policy, damage: Callable[[Path], None]
+) -> None:
+    make(store)
+    data = Store(store.root, policy).open(recipe.key)
+    damage(store.layout.entry(recipe.key) / "data.zarr/map/c/1/0")
+    with pytest.raises(DamagedEntry, match="changed or vanished"):
+        data["map"].values  # noqa: B018
+    np.testing.assert_array_equal(data["map"][0].values, [0, 1, np.nan])
+
+
+def test_a_missing_chunk_is_an_error_even_unchecked(store: Store, make: Callable[..., Entry], recipe: Recipe) -> None:
+    make(store)
+    (store.layout.entry(recipe.key) / "data.zarr/map/c/1/0").unlink()
+    with pytest.raises(DamagedEntry, match="changed or vanished"):
+        Store(store.root, "off").open(recipe.key)["map"].values  # noqa: B018
+
+
+def test_stores_and_opened_data_travel_to_other_processes(
+    store: Store, make: Callable[..., Entry], recipe: Recipe
+) -> None:
+    make(store)
+    again = pickle.loads(pickle.dumps(store))
+    assert again == store
+    data = pickle.loads(pickle.dumps(again.open(recipe.key)))
+    assert data["map"].values[1, 1] == 4
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.apply(again.find, (recipe.key,)) == store.find(recipe.key)
+
+
+def test_paths_are_absolute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert Store(Path("here")).root == tmp_path / "here"
+
+
+def test_history_is_newest_first_and_of_exactly_this_label(store: Store, make: Callable[..., Entry]) -> None:
+    entries = [make(store, n=n) for n in range(4)]
+    make(store, label={"scene": "Cones"}, n=9)
+    assert store.history({"product": "square", "scene": "Teddy"}) == entries[::-1]
+    assert store.history({"product": "square"}) == []
+    assert len(list(store.entries())) == 5
+
+
+def test_entries_skip_what_is_damaged_or_not_ours(store: Store, make: Callable[..., Entry], recipe: Recipe) -> None:
+    make(store)
+    folder = store.layout.record(recipe.key).parent
+    (folder / "notes.txt").write_text("x")
+    (folder / f"{recipe.key[:2]}{'0' * 62}.json").write_text("{}")
+    (folder / f"{'f' * 64}.json").write_text("{}")
+    (store.root / "records" / "notes").write_text("x")
+    assert [entry.key for entry in store.entries()] == [recipe.key]
+
+
+def test_labels_are_text(store: Store, recipe: Recipe) -> None:
+    with pytest.raises(InvalidRecipe, match="label must map text to text"):
+        store.begin(recipe, {"scene": 3})  # type: ignore[dict-item]
+    assert not store.root.exists()
+
+
+def test_drafts_of_the_dead_are_swept_and_those_of_the_living_kept(
+    store: Store, recipe: Recipe, filled: Callable[..., None], run_script: Callable[..., str]
+) -> None:
+    mine = store.begin(recipe, {})
+    filled(mine)
+    run_script(
+        """
+def work():
+    Store(sys.argv[1]).begin(recipe, {})
+    die()
+in_child(work)
+os.wait()
+""",
+        store.root,
+    )
+    (store.layout.drafts / "notes").write_text("x")
+    assert len(list(store.layout.drafts.iterdir())) == 3
+    assert store.sweep_drafts() == 1
+    assert store.sweep_drafts() == 0
+    assert mine.publish(0, {}).key == recipe.key
+
+
+def test_a_root_that_is_a_file_is_explained(tmp_path: Path, recipe: Recipe) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(CacheUnavailable, match=r"^cannot read the cache at [^\n]+; [^\n]+$"):
+        Store(tmp_path / "file").find(recipe.key)
+
+
+def test_a_kill_while_an_entry_is_set_aside_leaves_nothing_visible(
+    store: Store, make: Callable[..., Entry], recipe: Recipe, run_script: Callable[..., str]
+) -> None:
+    make(store)
+    (store.layout.entry(recipe.key) / "data.zarr/map/c/1/0").unlink()
+    run_script(
+        """
+def work():
+    quarantine.move_anything = die
+    Store(sys.argv[1]).require(recipe.key)
+assert code(in_child(work)) == -signal.SIGKILL
+""",
+        store.root,
+    )
+    assert store.find(recipe.key) is None
+    make(store)
+    assert store.check(recipe.key) is None
+
+
+def test_as_an_ordinary_user_a_read_only_cache_reads_and_is_explained(
+    store: Store, make: Callable[..., Entry], recipe: Recipe, run_script: Callable[..., str]
+) -> None:
+    make(store)
+    for path, thing in [*walk(store.root)]:
+        if thing.is_dir():
+            (store.root / path).chmod(0o555)
+    store.root.chmod(0o555)
+    printed = run_script(
+        """
+from cache import CacheError
+store = Store(sys.argv[1])
+print("root still" if os.access(sys.argv[1], os.W_OK) else "ordinary")
+print(store.open(recipe.key)["map"].values[1, 1])
+for attempt in (lambda: make(sys.argv[1]), lambda: store.lock(recipe.key).__enter__()):
+    try:
+        attempt()
+    except CacheError as error:
+        print(type(error).__name__, error)
+""",
+        store.root,
+        root=False,
+    )
+    kind, *lines = printed.splitlines()
+    if kind == "root still":
+        pytest.skip("root's rights cannot be dropped here")
+    assert lines[0] == "4.0"
+    assert len(lines) == 3
+    assert all("CacheUnavailable cannot write to the cache at" in line for line in lines[1:])
+    assert all("Permission denied; check its permissions" in line for line in lines[1:])
+
+
+def test_as_an_ordinary_user_everything_works(tmp_path: Path, run_script: Callable[..., str]) -> None:
+    printed = run_script(
+        """
+root = Path(sys.argv[1])
+store = Store(root / "cache")
+first = make(root / "cache")
+(store.layout.entry(first.key) / "data.zarr/map/c/1").chmod(0o755)
+(store.layout.entry(first.key) / "data.zarr/map/c/1/0").unlink()
+try:
+    store.require(first.key)
+except OSError as error:
+    print(error)
+print(make(root / "cache").digest == first.digest, store.check(first.key))
+print(len(list(store.layout.quarantine.iterdir())), len(list(store.layout.drafts.iterdir())))
+from cache.files import remove
+remove(root / "cache")
+print((root / "cache").exists())
+""",
+        tmp_path,
+        root=False,
+    )
+    lines = printed.splitlines()
+    assert "is missing" in lines[0]
+    assert lines[1:] == ["True None", "1 0", "False"]

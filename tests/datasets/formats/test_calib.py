@@ -1,0 +1,95 @@
+from pathlib import Path
+
+import pytest
+
+from datasets.errors import CalibrationError, MissingFileError
+from datasets.formats.calib import read_calib
+from datasets.scene import Calibration
+
+GOOD = {
+    "cam0": "[994.978 0 311.193; 0 994.978 254.877; 0 0 1]",
+    "cam1": "[994.978 0 342.279; 0 994.978 254.877; 0 0 1]",
+    "doffs": "31.086",
+    "baseline": "193.001",
+    "width": "741",
+    "height": "500",
+    "ndisp": "70",
+}
+
+
+def save(folder: Path, entries: dict[str, str]) -> Path:
+    path = folder / "calib.txt"
+    path.write_text("".join(f"{name}={value}\n" for name, value in entries.items()))
+    return path
+
+
+def test_reads_what_is_published(tmp_path: Path) -> None:
+    calib = read_calib(save(tmp_path, GOOD))
+    assert calib.calibration == Calibration(focal=994.978, baseline=193.001, doffs=31.086)
+    assert calib.size == (500, 741)
+    assert calib.ndisp == 70
+
+
+def test_spaces_blank_lines_and_other_names_do_not_matter(tmp_path: Path) -> None:
+    path = tmp_path / "calib.txt"
+    path.write_text("\n".join(f"  {name} = {value} \r" for name, value in GOOD.items()) + "\n\n isint= 0\nvmin=x\n")
+    assert read_calib(path) == read_calib(save(tmp_path, GOOD))
+
+
+@pytest.mark.parametrize("name", [name for name in GOOD if name != "cam1"])
+def test_names_a_missing_entry(tmp_path: Path, name: str) -> None:
+    path = save(tmp_path, {key: value for key, value in GOOD.items() if key != name})
+    with pytest.raises(CalibrationError, match=rf"no line {name}=\.\.\.; expected"):
+        read_calib(path)
+
+
+@pytest.mark.parametrize(
+    "name, value, line",
+    [
+        pytest.param("cam0", "[1 0 0; 0 1 0]", 1, id="two rows"),
+        pytest.param("cam0", "[1 0; 0 1; 0 0]", 1, id="two columns"),
+        pytest.param("cam0", "1 0 0; 0 1 0; 0 0 1", 1, id="no brackets"),
+        pytest.param("cam0", "[f 0 0; 0 f 0; 0 0 1]", 1, id="matrix in words"),
+        pytest.param("cam0", "[0 0 0; 0 0 0; 0 0 1]", 1, id="no focal length"),
+        pytest.param("cam0", "[nan 0 0; 0 1 0; 0 0 1]", 1, id="focal length NaN"),
+        pytest.param("doffs", "inf", 3, id="infinite doffs"),
+        pytest.param("doffs", "near", 3, id="doffs in words"),
+        pytest.param("baseline", "0", 4, id="cameras in one place"),
+        pytest.param("baseline", "-193", 4, id="negative baseline"),
+        pytest.param("width", "741.5", 5, id="fractional width"),
+        pytest.param("height", "0", 6, id="no rows"),
+        pytest.param("ndisp", "-1", 7, id="negative ndisp"),
+    ],
+)
+def test_names_the_line_of_an_invalid_entry(tmp_path: Path, name: str, value: str, line: int) -> None:
+    path = save(tmp_path, {**GOOD, name: value})
+    with pytest.raises(CalibrationError) as caught:
+        read_calib(path)
+    assert str(caught.value).startswith(f"{path}, line {line}: {name}={value}; expected ")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "content, message",
+    [
+        pytest.param(b"", "no line cam0", id="empty file"),
+        pytest.param(b"cam0\n", "line 1: 'cam0'; expected name=value", id="no sign"),
+        pytest.param(b"cam0=\n", "expected name=value", id="no value"),
+        pytest.param(b"=5\n", "expected name=value", id="no name"),
+        pytest.param(b"doffs=1\n\ndoffs=2\n", "line 3: doffs is given twice, first in line 1", id="given twice"),
+        pytest.param(b"\x89PNG\r\n", "not plain text", id="a PNG"),
+        pytest.param(b"a=1\n" * 20000, "at most 65,536 bytes", id="too long"),
+    ],
+)
+def test_refuses_what_is_no_calib(tmp_path: Path, content: bytes, message: str) -> None:
+    path = tmp_path / "calib.txt"
+    path.write_bytes(content)
+    with pytest.raises(CalibrationError) as caught:
+        read_calib(path)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_names_a_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(MissingFileError, match="cannot be read"):
+        read_calib(tmp_path / "calib.txt")

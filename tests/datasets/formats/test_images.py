@@ -1,0 +1,186 @@
+import io
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from datasets.errors import ImageError, MissingFileError
+from datasets.formats import images, limits
+from datasets.formats.images import image_size, read_image
+
+GRAY = np.arange(6, dtype=np.uint8).reshape(2, 3) * 40
+RGB = np.stack([GRAY, GRAY + 1, GRAY + 2], axis=2)
+DEEP = np.arange(6, dtype=np.uint16).reshape(2, 3) * 13000
+
+
+def encode(image: Image.Image, form: str = "PNG", **options: object) -> bytes:
+    buffer = io.BytesIO()
+    image.save(buffer, form, **options)
+    return buffer.getvalue()
+
+
+def png(colour_type: int, depth: int, columns: int, rows: int, data: bytes) -> bytes:
+    """A PNG made by hand, as Pillow writes no 16-bit colour and no false sizes."""
+
+    def chunk(name: bytes, body: bytes) -> bytes:
+        return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+
+    header = struct.pack(">IIBBBBB", columns, rows, depth, colour_type, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(data)) + chunk(b"IEND", b"")
+
+
+def palette() -> Image.Image:
+    image = Image.new("P", (2, 1))
+    image.putpalette([10, 20, 30, 200, 100, 50])
+    image.putdata([0, 1])
+    return image
+
+
+def turned(form: str, orientation: int) -> bytes:
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    return encode(Image.fromarray(GRAY), form, exif=exif)
+
+
+@pytest.mark.parametrize(
+    "content, expected",
+    [
+        pytest.param(encode(Image.fromarray(GRAY)), GRAY, id="8-bit gray"),
+        pytest.param(encode(Image.fromarray(RGB)), RGB, id="8-bit RGB"),
+        pytest.param(encode(Image.fromarray(DEEP)), DEEP, id="16-bit gray PNG stays 16-bit"),
+        pytest.param(encode(Image.fromarray(DEEP), "TIFF"), DEEP, id="16-bit gray TIFF stays 16-bit"),
+        pytest.param(b"P5\n3 2\n65535\n" + DEEP.astype(">u2").tobytes(), DEEP, id="16-bit PGM stays 16-bit"),
+        pytest.param(b"P6\n3 2\n255\n" + RGB.tobytes(), RGB, id="PPM"),
+        pytest.param(encode(Image.fromarray(RGB), "BMP"), RGB, id="BMP"),
+        pytest.param(encode(palette()), np.array([[[10, 20, 30], [200, 100, 50]]]), id="palette becomes RGB"),
+        pytest.param(
+            encode(Image.fromarray(np.dstack([RGB, np.zeros_like(GRAY)]))), RGB, id="alpha dropped, colour as stored"
+        ),
+        pytest.param(encode(Image.merge("LA", [Image.fromarray(GRAY)] * 2)), GRAY, id="gray with alpha"),
+        pytest.param(encode(Image.fromarray(GRAY > 100)), np.where(GRAY > 100, 255, 0), id="1 bit becomes 0 and 255"),
+        pytest.param(encode(Image.new("L", (1, 1), 7)), np.array([[7]]), id="one pixel"),
+    ],
+)
+def test_reads_what_is_stored(tmp_path: Path, content: bytes, expected: np.ndarray) -> None:
+    path = tmp_path / "image.dat"
+    path.write_bytes(content)
+    image = read_image(path)
+    assert image.dtype == (np.uint16 if expected is DEEP else np.uint8)
+    np.testing.assert_array_equal(image, expected)
+    assert image_size(path) == image.shape[:2]
+    image[0] = 0
+
+
+@pytest.mark.parametrize("form", ["PNG", "TIFF"])
+@pytest.mark.parametrize(
+    "orientation, expected",
+    [
+        pytest.param(1, GRAY, id="upright"),
+        pytest.param(2, GRAY[:, ::-1], id="mirrored"),
+        pytest.param(3, GRAY[::-1, ::-1], id="upside down"),
+        pytest.param(4, GRAY[::-1], id="flipped"),
+        pytest.param(5, GRAY.T, id="transposed"),
+        pytest.param(6, np.rot90(GRAY, -1), id="turn clockwise"),
+        pytest.param(7, np.rot90(GRAY, 2).T, id="transversed"),
+        pytest.param(8, np.rot90(GRAY), id="turn anticlockwise"),
+    ],
+)
+def test_applies_the_exif_orientation(tmp_path: Path, form: str, orientation: int, expected: np.ndarray) -> None:
+    path = tmp_path / "image.dat"
+    path.write_bytes(turned(form, orientation))
+    np.testing.assert_array_equal(read_image(path), expected)
+    assert image_size(path) == expected.shape
+
+
+def test_jpeg_is_read_upright(tmp_path: Path) -> None:
+    path = tmp_path / "image.jpg"
+    path.write_bytes(turned("JPEG", 6))
+    assert read_image(path).shape == image_size(path) == (3, 2)
+
+
+def animation() -> bytes:
+    frames = [Image.new("L", (2, 2), value) for value in (0, 255)]
+    return encode(frames[0], "TIFF", save_all=True, append_images=frames[1:])
+
+
+BAD_IMAGES = [
+    pytest.param(b"", "no image in PNG", id="empty file"),
+    pytest.param(b"\x89PNG\r\n\x1a\n", "no image in PNG", id="PNG signature only"),
+    pytest.param(encode(Image.fromarray(RGB.repeat(40, 0)))[:-30], "damaged image", id="truncated PNG"),
+    pytest.param(encode(Image.fromarray(RGB.repeat(40, 0)), "JPEG")[:-60], "damaged image", id="truncated JPEG"),
+    pytest.param(encode(Image.fromarray(GRAY), "TIFF")[:-140], "image", id="truncated TIFF"),
+    pytest.param(b"P5\n3 2\n255\n\0\0", "damaged image", id="truncated PGM"),
+    pytest.param(b"P5\nx 2\n255\n\0\0", "image", id="PGM without a size"),
+    pytest.param(b"hello, I am a text", "no image in PNG", id="a text"),
+    pytest.param(encode(Image.fromarray(RGB), "GIF"), "no image in PNG", id="a GIF, not among the formats"),
+    pytest.param(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n", "no image in PNG", id="a PostScript program"),
+    pytest.param(b"Pf\n1 1\n-1\n\0\0\0\0", "pixels are F", id="a PFM, whose floats are no image"),
+    pytest.param(encode(Image.new("CMYK", (2, 2)), "TIFF"), "pixels are CMYK", id="CMYK"),
+    pytest.param(encode(Image.new("F", (2, 2)), "TIFF"), "pixels are F", id="float"),
+    pytest.param(encode(Image.new("LAB", (2, 2)), "TIFF"), "pixels are LAB", id="another colour space"),
+    pytest.param(encode(Image.new("I", (2, 2), -5), "TIFF"), "do not fit 16 bits", id="negative 32-bit gray"),
+    pytest.param(encode(Image.new("I", (2, 2), 70000), "TIFF"), "do not fit 16 bits", id="32-bit gray"),
+    pytest.param(png(2, 16, 2, 1, b"\0" + bytes(12)), "16-bit colour", id="16-bit RGB would lose 8 bits"),
+    pytest.param(png(6, 16, 2, 1, b"\0" + bytes(16)), "16-bit colour", id="16-bit RGBA"),
+    pytest.param(png(4, 16, 2, 1, b"\0" + bytes(8)), "16-bit colour", id="16-bit gray with alpha"),
+    pytest.param(b"P6\n1 1\n65535\n" + bytes(6), "largest value 65535", id="16-bit PPM would lose 8 bits"),
+    pytest.param(b"P5\n1 1\n100\n\x07", "largest value 100", id="PGM whose values would be stretched"),
+    pytest.param(animation(), "holds 2 images", id="several images in one file"),
+    pytest.param(png(0, 8, 9000, 9000, b"\0"), "9000 x 9000 = 81,000,000 pixels", id="above the limit"),
+    pytest.param(png(0, 8, 60000, 60000, b"\0"), "pixels", id="decompression bomb"),
+    pytest.param(png(0, 8, 3, 2, b"\0"), "damaged image", id="fewer pixels than the header says"),
+]
+
+
+@pytest.mark.parametrize("content, message", BAD_IMAGES)
+@pytest.mark.filterwarnings("ignore::PIL.Image.DecompressionBombWarning")
+def test_refuses_a_bad_image_in_one_line(tmp_path: Path, content: bytes, message: str) -> None:
+    path = tmp_path / "image.dat"
+    path.write_bytes(content)
+    with pytest.raises(ImageError) as caught:
+        read_image(path)
+    assert message in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("read", [read_image, image_size])
+@pytest.mark.parametrize("name", ["absent.png", "."])
+def test_names_what_cannot_be_opened(tmp_path: Path, read: Callable[[Path], object], name: str) -> None:
+    with pytest.raises(MissingFileError, match="cannot be read"):
+        read(tmp_path / name)
+
+
+@pytest.mark.parametrize("form", ["PNG", "JPEG", "TIFF", "BMP", "PPM"])
+@pytest.mark.filterwarnings("ignore")
+def test_garbled_bytes_give_an_image_or_an_image_error(tmp_path: Path, form: str) -> None:
+    random = np.random.default_rng(0)
+    path = tmp_path / "image.dat"
+    content = encode(Image.fromarray(RGB), form)
+    for _ in range(200):
+        garbled = bytearray(content)
+        for position in random.integers(min(len(content), 200), size=3):
+            garbled[position] = random.integers(256)
+        path.write_bytes(garbled)
+        try:
+            assert read_image(path).size
+        except ImageError as error:
+            assert "\n" not in str(error)
+
+
+def test_the_limit_is_checked_before_a_pixel_is_decoded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "image.png"
+    path.write_bytes(png(0, 8, 3, 2, b"no pixels at all"))
+    monkeypatch.setattr(limits, "MAX_PIXELS", 5)
+    with pytest.raises(ImageError, match="2 x 3 = 6 pixels, above the limit of 5"):
+        images.image_size(path)
+
+
+def test_size_needs_the_header_only(tmp_path: Path) -> None:
+    path = tmp_path / "image.png"
+    path.write_bytes(png(0, 8, 3, 2, b"no pixels at all"))
+    assert image_size(path) == (2, 3)

@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+
+from datasets.occlusion import left_right_check, warped_truth_mask
+
+NAN = np.nan
+YES, NO = True, False
+
+
+def row(*values: float) -> np.ndarray:
+    return np.array([values], np.float32)
+
+
+@pytest.mark.parametrize(
+    "left, right, expected",
+    [
+        pytest.param(row(0, 0, 0), row(0, 0, 0), [YES, YES, YES], id="at infinity"),
+        pytest.param(row(1, 1, 1), row(1, 1, 1), [NO, YES, YES], id="the first pixel lands outside"),
+        pytest.param(row(-1, -1, -1), row(-1, -1, -1), [YES, YES, NO], id="negative: the last lands outside"),
+        pytest.param(row(NAN, 0, 0), row(0, 0, NAN), [NO, YES, NO], id="unknown in either view"),
+        pytest.param(row(0, 0, 0, 2, 2), row(0, 2, 2, 0, 0), [YES, NO, NO, YES, YES], id="covered by a nearer pixel"),
+        pytest.param(row(0, 1, 0), row(0, 1, 1), [YES, YES, YES], id="a difference of the tolerance is let pass"),
+        pytest.param(row(0.6, 0.6, 0.6), row(0.6, 9, 0.6), [NO, YES, NO], id="read at the nearest column"),
+    ],
+)
+def test_left_right_check_by_hand(left: np.ndarray, right: np.ndarray, expected: list[bool]) -> None:
+    assert left_right_check(left, right).tolist() == [expected]
+
+
+def test_left_right_check_takes_a_tolerance() -> None:
+    assert left_right_check(row(0, 0), row(0.25, 0.5), tolerance=0.25).tolist() == [[YES, NO]]
+
+
+@pytest.mark.parametrize(
+    "left, expected",
+    [
+        pytest.param(row(0, 0, 0), [YES, YES, YES], id="flat"),
+        pytest.param(row(2, 2, 2), [NO, NO, YES], id="lands outside"),
+        pytest.param(row(0, 0, 0, 2, 2, 0), [YES, NO, NO, YES, YES, YES], id="covered by a nearer pixel"),
+        pytest.param(row(NAN, NAN, NAN), [NO, NO, NO], id="nothing known"),
+        pytest.param(row(0, 0, 0, NAN, NAN), [YES, YES, YES, NO, NO], id="unknown covers nothing"),
+        pytest.param(row(0, 0.5, 1, 1.5, 2, 2.5), [YES] * 6, id="a slanted surface does not cover itself"),
+        pytest.param(row(0, 0, 0, 0, 1.5, 1.5), [YES, YES, NO, NO, YES, YES], id="between columns both are covered"),
+    ],
+)
+def test_warped_truth_by_hand(left: np.ndarray, expected: list[bool]) -> None:
+    assert warped_truth_mask(left).tolist() == [expected]
+
+
+def test_rows_do_not_mix() -> None:
+    both = np.concatenate([row(0, 0, 0, 2, 2), row(0, 0, 0, 0, 0)])
+    assert warped_truth_mask(both).tolist() == [[YES, NO, NO, YES, YES], [YES] * 5]
+    assert left_right_check(both, both)[1].all()

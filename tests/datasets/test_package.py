@@ -1,0 +1,34 @@
+import subprocess
+import sys
+
+import pytest
+
+import datasets
+
+HEAVY = {"skimage", "torch", "matplotlib", "scipy", "imageio"}
+
+
+@pytest.mark.parametrize(
+    "code, absent",
+    [
+        pytest.param("import datasets", HEAVY | {"numpy", "PIL"}, id="the package alone"),
+        pytest.param("import datasets; datasets.DatasetError", HEAVY | {"numpy", "PIL"}, id="the errors"),
+        pytest.param("import datasets; datasets.describe()", HEAVY | {"PIL"}, id="listing the specifications"),
+        pytest.param("import datasets; datasets.open_dataset('motorcycle').scenes[0].load()", HEAVY, id="a scene"),
+    ],
+)
+def test_imports_nothing_heavy(code: str, absent: set[str]) -> None:
+    check = f"import sys; {code}; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=True)
+    assert not absent & set(done.stdout.split())
+
+
+@pytest.mark.parametrize("name", datasets.__all__)
+def test_every_public_name_is_there(name: str) -> None:
+    assert getattr(datasets, name) is not None
+    assert name in dir(datasets)
+
+
+def test_another_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = datasets.nothing
