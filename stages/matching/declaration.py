@@ -19,10 +19,10 @@ class MatchingSamplesParams(Params):
     """What the matching-Net learns from."""
 
     form: Form = Field("dense", description="dense crops, or the paper's patches")
-    samples: int = Field(6000, ge=1, description="samples in all, over the scenes in equal parts")
+    samples: int = Field(7200, ge=1, description="samples in all, over the scenes in equal parts")
     height: int = Field(24, ge=1, le=256, description="rows of a dense crop, px")
     width: int = Field(40, ge=1, le=256, description="columns of a dense crop, px")
-    slots: int = Field(12, ge=3, le=64, description="disparities a dense crop is compared at")
+    slots: int = Field(8, ge=3, le=64, description="disparities a dense crop is compared at")
     mirror: bool = Field(True, description="mirror half of the samples where the right view has a truth")
     seed: int = Field(0, ge=0, description="seed of the draw")
 
@@ -40,8 +40,9 @@ class MatchingSamplesParams(Params):
 class MatchingNetParams(Schedule):
     """The matching-Net and how it is trained."""
 
+    steps: int = Field(1200, ge=1, description="optimiser steps")
     head: Head = Field("compact", description="hidden layers: 128 units, or the paper's 1600 and 128")
-    batch: int = Field(4, ge=SHARDS, description="samples a step; a multiple of the number of shards")
+    batch: int = Field(6, ge=SHARDS, description="samples a step; a multiple of the number of shards")
     relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting a view; 0: none, as the paper")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
     seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
