@@ -13,12 +13,12 @@ from typing import Any, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.errors import UsageError
-from stages.disparity import DisparityParams
+from stages.disparity_declaration import DisparityParams
 from stages.evaluation.declaration import ConfidenceParams, EvaluationNetParams, EvaluationSamplesParams
 from stages.filtering import SemidenseParams
 from stages.matching.declaration import CostVolumeParams, MatchingNetParams, MatchingSamplesParams
 from stages.stage import NoParams, Params
-from stages.transforms.channels import ChannelsParams
+from stages.transforms.declaration import ChannelsParams
 
 
 class TrainingParams(Params):

@@ -11,7 +11,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from cache import ABSENT, Change, Entry, Recipe, Store, differences
-from pipeline.steps import Request, Step, build
+from pipeline.config import nearest
+from pipeline.errors import UsageError
+from pipeline.steps import PRODUCTS, Request, Step, build
 
 State = Literal["hit", "made", "stale", "missing"]
 _PENDING = "to be made again"
@@ -47,13 +49,13 @@ class Plan:
 
     Attributes:
         steps: in the order in which they can be made.
-        targets: ids of the steps that were asked for.
+        targets: ids of the steps that were asked for, each with its variant.
         notes: what a person should know.
         forced: products that are made again even if they are there.
     """
 
     steps: tuple[Planned, ...]
-    targets: tuple[str, ...]
+    targets: tuple[tuple[str, str], ...]
     notes: tuple[str, ...] = ()
     forced: frozenset[str] = frozenset()
 
@@ -74,6 +76,9 @@ def make_plan(request: Request, store: Store, forced: Iterable[str] = ()) -> Pla
         UsageError, DatasetError, StageError: if the request cannot be carried out.
         CacheUnavailable: if the cache cannot be read.
     """
+    unknown = sorted(set(forced) - set(PRODUCTS))
+    if unknown:
+        raise UsageError(f"no product {unknown[0]!r} to force; {nearest(unknown[0], PRODUCTS)}")
     graph = build(request)
     planner = _Planner(store, frozenset(forced))
     planned = tuple(planner.look_at(step) for step in graph.steps.values())
@@ -113,17 +118,17 @@ class _Planner:
 
     def _changes(self, step: Step, recipe: Recipe) -> tuple[Change, ...]:
         """Return how a recipe differs from the nearest earlier one of the same label."""
-        candidates = [differences(entry.recipe, recipe) for entry in self._earlier(step)]
-        return tuple(min(candidates, key=len, default=[]))
+        candidates: list[list[Change]] = [differences(entry.recipe, recipe) for entry in self._earlier(step)]
+        return _fewest(candidates)
 
     def _pending(self, step: Step, open_inputs: Mapping[str, tuple[str, ...]]) -> tuple[Change, ...]:
         """Return the step's own changes, and the inputs that are to be made before it."""
         pending = tuple(Change(f"inputs.{product}", ABSENT, _PENDING) for product in open_inputs)
-        own = [
+        own: list[list[Change]] = [
             [change for change in differences(entry.recipe, _own(step, entry.recipe)) if change.field != "inputs"]
             for entry in self._earlier(step)
         ]
-        return (*min(own, key=len, default=[]), *pending)
+        return (*_fewest(own), *pending)
 
     def _earlier(self, step: Step) -> list[Entry]:
         """Return the results of the same label, newest first; the cache is read once for all steps."""
@@ -132,6 +137,11 @@ class _Planner:
             for entry in sorted(self.store.entries(), key=lambda entry: entry.created, reverse=True):
                 self._history.setdefault(tuple(sorted(entry.label.items())), []).append(entry)
         return self._history.get(tuple(sorted(step.label.items())), [])
+
+
+def _fewest(candidates: list[list[Change]]) -> tuple[Change, ...]:
+    """Return the shortest list of changes; of equal ones the first, which is the newest result's."""
+    return tuple(min(candidates, key=lambda changes: len(changes))) if candidates else ()
 
 
 def _own(step: Step, earlier: Recipe) -> Recipe:

@@ -6,7 +6,7 @@ share the steps in which they agree, so a sweep computes nothing twice. Nothing 
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
@@ -96,12 +96,12 @@ class Graph:
 
     Attributes:
         steps: by id, in order.
-        targets: ids of the products that were asked for.
+        targets: ids of the products that were asked for, each with its variant.
         notes: what a person should know, such as scenes left out.
     """
 
     steps: dict[str, Step] = field(default_factory=dict)
-    targets: list[str] = field(default_factory=list)
+    targets: list[tuple[str, str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
 
@@ -111,14 +111,14 @@ class Request:
 
     Attributes:
         dataset: the scenes.
-        configs: one configuration, or several of a sweep.
+        configs: one configuration, or several of a sweep, by the name of the variant (empty for a single one).
         upto: the product to stop at.
         train: train the networks instead of taking the shipped weights.
         training: the scenes to train on; needed with ``train``.
     """
 
     dataset: Dataset
-    configs: tuple[Config, ...]
+    configs: Mapping[str, Config]
     upto: str = "metrics"
     train: bool = False
     training: tuple[SceneSource, ...] = ()
@@ -137,24 +137,38 @@ def build(request: Request) -> Graph:
         StageError: if shipped weights are needed and there are none.
     """
     graph = Graph()
-    trained_on = {json.dumps(scene.image_identity(), sort_keys=True) for scene in request.training}
-    for config in request.configs:
+    trained_on = {_identity(scene) for scene in request.training}
+    for variant, config in request.configs.items():
         builder = _Builder(graph, config, request)
-        if request.upto in STAGES and STAGES[request.upto].scope == "split":
-            graph.targets.append(builder.product(request.upto, None))
-            continue
-        for scene in request.dataset.scenes:
-            if json.dumps(scene.image_identity(), sort_keys=True) in trained_on:
-                graph.notes.append(f"{scene.name} is a training scene: it is left out, since nothing is tested on it")
-            elif request.upto in ("truth", "metrics") and not scene.has_truth:
-                graph.notes.append(f"{scene.name} has no ground truth: there are no metrics for it")
-                graph.targets.append(builder.product("images" if request.upto == "truth" else "semidense", scene))
-            else:
-                graph.targets.append(builder.product(request.upto, scene))
+        graph.targets += [(step_id, variant) for step_id in _targets(builder, trained_on)]
+    # The order of the products is one in which each comes after its inputs, whichever scenes they belong to.
+    in_order = sorted(graph.steps.items(), key=lambda item: PRODUCTS.index(item[1].product))
+    graph.steps = dict(in_order)
     graph.notes = list(dict.fromkeys(graph.notes))
     if not graph.targets:
         raise UsageError(f"{request.dataset.spec}: no scene is left to work on; {'; '.join(graph.notes)}")
     return graph
+
+
+def _targets(builder: "_Builder", trained_on: set[str]) -> Iterator[str]:
+    """Add what one configuration asks for; yield the ids of its last steps."""
+    upto, notes = builder.request.upto, builder.graph.notes
+    if upto in STAGES and STAGES[upto].scope == "split":
+        yield builder.product(upto, None)
+        return
+    for scene in builder.request.dataset.scenes:
+        if _identity(scene) in trained_on:
+            notes.append(f"{scene.name} is a training scene: it is left out, since nothing is tested on it")
+        elif upto in ("truth", "metrics") and not scene.has_truth:
+            notes.append(f"{scene.name} has no ground truth: there are no metrics for it")
+            yield builder.product("images" if upto == "truth" else "semidense", scene)
+        else:
+            yield builder.product(upto, scene)
+
+
+def _identity(scene: SceneSource) -> str:
+    """Return what tells whether two scenes show the same pair."""
+    return json.dumps(scene.image_identity(), sort_keys=True)
 
 
 @dataclass
@@ -252,17 +266,16 @@ def _environment() -> dict[str, str]:
     return {"torch": version("torch").split(".")[0], "numpy": version("numpy").split(".")[0], "zarr_format": "3"}
 
 
-def training_scenes(datasets: Iterable[Dataset]) -> tuple[SceneSource, ...]:
-    """Return the scenes that may be trained on and have a truth.
+def training_scenes(dataset: Dataset) -> tuple[SceneSource, ...]:
+    """Return the scenes of a dataset that may be trained on and have a truth.
 
     Raises:
         UsageError: if there is none.
     """
-    found: Sequence[Dataset] = list(datasets)
-    scenes = tuple(scene for dataset in found for scene in dataset.scenes if scene.split == "train" and scene.has_truth)
+    scenes = tuple(scene for scene in dataset.scenes if scene.split == "train" and scene.has_truth)
     if not scenes:
-        names = ", ".join(dataset.spec for dataset in found)
         raise UsageError(
-            f"{names}: no training scene; name a dataset that has some with --set training.dataset=middlebury:DIR"
+            f"{dataset.spec} has no training scene: name a dataset that has some with "
+            "--set training.dataset=middlebury:DIR"
         )
     return scenes

@@ -197,7 +197,7 @@ def _made(step: Step, entry: Entry, reused: bool) -> Made:
     return Made(step, entry.key, entry.digest, entry.seconds, reused)
 
 
-def _read_whole(store: Store, step: Step, product: str, keys: Sequence[str]) -> Arrays | list[Arrays]:
+def _read_whole(store: Store, step: Step, product: str, keys: Sequence[str]) -> Arrays | Sequence[Arrays]:
     """Return a product's arrays; where a split step takes one a scene, a list."""
     arrays = [_arrays(store, key) for key in keys]
     return arrays if step.takes_list(product) else arrays[0]

@@ -24,7 +24,7 @@ def relight(
         gray: index of the gray channel, or None if the network has none.
 
     Returns:
-        float32 (channel, y, x), a copy.
+        float32 (channel, y, x): a copy, or at strength 0 the view itself. NaN stays NaN.
     """
     if strength == 0 or gray is None:
         return view

@@ -4,13 +4,13 @@ The declarations stand beside what can be set for them; the functions that they 
 when something is computed.
 """
 
-from stages.disparity import DISPARITY
+from stages.disparity_declaration import DISPARITY
 from stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
 from stages.filtering import SEMIDENSE
 from stages.matching.declaration import COST_VOLUME, MATCHING_NET, MATCHING_SAMPLES
 from stages.metrics import METRICS
 from stages.stage import Stage
-from stages.transforms.channels import CHANNELS
+from stages.transforms.declaration import CHANNELS
 
 CATALOG: tuple[Stage, ...] = (
     CHANNELS,

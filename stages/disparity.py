@@ -4,19 +4,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
+from stages.disparity_declaration import DisparityParams
 from stages.kernel import kernel
-from stages.stage import Array, Arrays, Inputs, Output, Params, Stage, StageError, require_shape
+from stages.stage import Array, Arrays, Inputs, StageError, require_shape
 
 NONE = np.int16(np.iinfo(np.int16).max)
 """The rank of an invalid cost: above every number's, infinity included."""
-
-
-class DisparityParams(Params):
-    """How a disparity is read off the cost volume."""
-
-    subpixel: bool = Field(default=False, description="refine by a parabola through three costs; off in the paper")
 
 
 def winner_take_all(costs: NDArray[Any], d_min: int) -> NDArray[np.float32]:
@@ -156,15 +150,3 @@ def compute_disparity(params: DisparityParams, inputs: Inputs) -> Arrays:
     d_min = int(range_[0]) if range_.size else 0
     disparity = winner_take_all(costs, d_min)
     return {"disparity": refine_subpixel(costs, disparity, d_min) if params.subpixel else disparity}
-
-
-DISPARITY = Stage(
-    product="disparity",
-    inputs=("costvolume",),
-    outputs=(Output("disparity", ("y", "x"), "float32", "px", "raw disparity of the left view; NaN: no valid cost"),),
-    compute="stages.disparity:compute_disparity",
-    params=DisparityParams,
-    tile_rows=32,
-)
-"""The raw disparity. ``costvolume`` has ``cost`` (y, x, d) float16 and its coordinate ``d`` (d,) int16, px. A tile has
-the rows of one chunk of the volume, so that each chunk is read once."""

@@ -1,7 +1,8 @@
 """Read images as the arrays they are: 8 or 16 bits, gray or RGB, upright, never cut down in silence.
 
-Pillow reads PNG, JPEG, TIFF, BMP and PPM/PGM here, and nothing else gets a chance: no other decoder is ever chosen by
-what happens to be installed, and a file's extension does not count.
+A file's header is judged first, then imageio decodes with its Pillow plugin: PNG, JPEG, TIFF, BMP and PPM/PGM, and
+nothing else gets a chance. No other decoder is ever chosen by what happens to be installed, and a file's extension does
+not count.
 """
 
 import os
@@ -9,6 +10,7 @@ import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO, TypeAlias
 
 import numpy as np
 from PIL import Image, UnidentifiedImageError
@@ -18,19 +20,15 @@ from datasets.arrays import ImageArray
 from datasets.errors import ImageError, MissingFileError
 from datasets.formats.limits import check_pixels
 
+_Pixels: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.integer]]
 _FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "PPM")
 _DECODER_ERRORS = (OSError, EOFError, SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, struct.error)
 """What Pillow's decoders raise on truncated or garbled files."""
 _ORIENTATION = 0x0112
-_UPRIGHT = {
-    2: Image.Transpose.FLIP_LEFT_RIGHT,
-    3: Image.Transpose.ROTATE_180,
-    4: Image.Transpose.FLIP_TOP_BOTTOM,
-    5: Image.Transpose.TRANSPOSE,
-    6: Image.Transpose.ROTATE_270,
-    7: Image.Transpose.TRANSVERSE,
-    8: Image.Transpose.ROTATE_90,
-}
+_TRANSPOSED = 5
+"""The first EXIF orientation that swaps rows and columns, as all above it do."""
+_STEPS = {1: (1, 1), 2: (1, -1), 3: (-1, -1), 4: (-1, 1), 5: (1, 1), 6: (1, -1), 7: (-1, -1), 8: (-1, 1)}
+"""Which way to walk down and across, once rows and columns are swapped, for each EXIF orientation."""
 _CONVERSIONS = {
     **{mode: mode for mode in ("L", "RGB", "I", "I;16", "I;16B", "I;16L")},
     "1": "L",
@@ -56,13 +54,9 @@ def read_image(path: str | os.PathLike[str]) -> ImageArray:
             several images, or stores what would not survive: 16-bit colour, floats, CMYK and other colour spaces.
     """
     path = Path(path)
-    with _opened(path) as image:
-        orientation = _orientation(image)
-        mode = _target_mode(path, image)
-        converted = image if image.mode == mode else image.convert(mode)
-        if orientation in _UPRIGHT:
-            converted = converted.transpose(_UPRIGHT[orientation])
-        return _to_array(path, np.array(converted))
+    with _opened(path) as (file, image):
+        orientation, mode = _orientation(image), _target_mode(path, image)
+        return _to_array(path, _upright(_decoded(path, file, image, mode), orientation))
 
 
 def image_size(path: str | os.PathLike[str]) -> tuple[int, int]:
@@ -72,18 +66,18 @@ def image_size(path: str | os.PathLike[str]) -> tuple[int, int]:
         MissingFileError: If there is no such file.
         ImageError: If the header is damaged, no image's, or above `MAX_PIXELS`.
     """
-    with _opened(Path(path)) as image:
+    with _opened(Path(path)) as (_, image):
         columns, rows = image.size
-        return (columns, rows) if _orientation(image) >= 5 else (rows, columns)
+        return (columns, rows) if _orientation(image) >= _TRANSPOSED else (rows, columns)
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[ImageFile]:
+def _opened(path: Path) -> Iterator[tuple[BinaryIO, ImageFile]]:
     """Open a file and turn whatever goes wrong with it, now or later, into one line."""
     try:
         with path.open("rb") as file, Image.open(file, formats=_FORMATS) as image:
             check_pixels(path, image.height, image.width, ImageError)
-            yield image
+            yield file, image
     except ImageError:
         raise
     except UnidentifiedImageError as error:
@@ -104,7 +98,8 @@ def _orientation(image: ImageFile) -> int:
         return 1
     exif = Image.Exif()
     exif.load(image.info["exif"])
-    return int(exif.get(_ORIENTATION, 1))
+    orientation = int(exif.get(_ORIENTATION, 1))
+    return orientation if orientation in _STEPS else 1
 
 
 def _target_mode(path: Path, image: ImageFile) -> str:
@@ -126,7 +121,24 @@ def _check_depth(path: Path, mode: str, layout: object, largest: list[object]) -
         raise ImageError(f"{path}: largest value {largest[0]}; supported are 255, and 65535 for binary gray")
 
 
-def _to_array(path: Path, array: np.ndarray[tuple[int, ...], np.dtype[np.integer]]) -> ImageArray:
+def _decoded(path: Path, file: BinaryIO, header: ImageFile, mode: str) -> _Pixels:
+    import imageio.v3 as iio  # sizes and checks need headers only
+
+    # imageio lets every format known to Pillow bid for the file, not only those the header was judged by.
+    chosen = Image.open(file).format
+    if chosen != header.format:
+        raise ImageError(f"{path}: reads as {header.format} and as {chosen}; save it again as PNG")
+    return iio.imread(file, plugin="pillow", index=0, mode=mode)
+
+
+def _upright(array: _Pixels, orientation: int) -> _Pixels:
+    # Not imageio's `rotate`: it mixes up the axes of palettes and of gray with alpha, and heeds tags after the pixels.
+    down, across = _STEPS[orientation]
+    turned = array.swapaxes(0, 1) if orientation >= _TRANSPOSED else array
+    return np.ascontiguousarray(turned[::down, ::across])
+
+
+def _to_array(path: Path, array: _Pixels) -> ImageArray:
     if array.dtype == np.uint8:
         return array.astype(np.uint8, copy=False)
     if array.min() < 0 or array.max() > np.iinfo(np.uint16).max:

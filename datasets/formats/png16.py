@@ -7,7 +7,6 @@ import os
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from datasets.arrays import DisparityMap
 from datasets.errors import Png16Error
@@ -52,6 +51,8 @@ def write_png16(path: str | os.PathLike[str], disparity: np.ndarray[tuple[int, .
         Png16Error: If the array is not a float map of (y, x), is empty, or holds values outside that range.
         OSError: If the file cannot be written.
     """
+    import imageio.v3 as iio  # here, as few who import this write
+
     path, disparity = Path(path), np.asarray(disparity)
     if disparity.ndim != 2 or disparity.dtype.kind != "f":
         raise Png16Error(f"{path}: give a float array of (rows, columns), not {disparity.dtype} of {disparity.shape}")
@@ -65,4 +66,4 @@ def write_png16(path: str | os.PathLike[str], disparity: np.ndarray[tuple[int, .
         )
     stored = np.where(known, np.maximum(steps, 1), 0).astype(np.uint16)
     with atomic_write(path) as file:
-        Image.fromarray(stored).save(file, format="PNG")
+        iio.imwrite(file, stored, plugin="pillow", extension=".png")

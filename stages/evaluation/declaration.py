@@ -31,7 +31,9 @@ class EvaluationNetParams(Schedule):
 
     steps: int = Field(1500, ge=1, description="optimiser steps")
     first_rate: float = Field(0.001, gt=0, description="learning rate of the first step")
-    batch: int = Field(8, ge=SHARDS, description="samples a step; a multiple of the number of shards")
+    batch: int = Field(
+        8, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"
+    )
     flip: bool = Field(True, description="turn half of the samples upside down (mirroring would move the occlusions)")
     relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting; 0: none, as the paper")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")

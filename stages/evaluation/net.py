@@ -55,7 +55,8 @@ class EvaluationNet(nn.Module):
             layers: (B, 2, H, W), standardised gray and disparity in units of ``DISPARITY_UNIT``.
 
         Returns:
-            (B, 2, (H - 101) // 16 + 1, (W - 101) // 16 + 1).
+            (B, 2, (H - 94) // 16 + 1, (W - 94) // 16 + 1): of a patch only its first 94 rows and columns
+            need to lie on the map.
         """
         return self._head(self._run(layers, lambda maps: functional.max_pool2d(maps, 2)))
 

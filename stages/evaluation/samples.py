@@ -29,7 +29,7 @@ def draw_samples(params: EvaluationSamplesParams, inputs: Inputs) -> dict[str, N
         1 right, 0 wrong, -1 unknown.
 
     Raises:
-        StageError: if no scene has a pixel with a known truth.
+        StageError: if no scene has a pixel with a known truth, or, for ``patch``, none has a wrong one.
     """
     rng = np.random.default_rng(params.seed)
     pairs = zip(by_scene(inputs, "disparity"), by_scene(inputs, "truth"), strict=True)
@@ -65,6 +65,8 @@ def _patches(labels: list[NDArray[np.int8]], rng: np.random.Generator) -> NDArra
         wrong, right = np.argwhere(label == 0), np.argwhere(label == 1)
         chosen = np.concatenate([wrong, right[rng.permutation(len(right))[: len(wrong)]]])
         places.append(np.column_stack([np.full(len(chosen), scene), chosen]))
+    if not any(map(len, places)):
+        raise StageError("no training scene has a wrong disparity to learn from: use the form 'strided'")
     return rng.permutation(np.concatenate(places))
 
 

@@ -41,10 +41,10 @@ def train_evaluation_net(
         rng = np.random.default_rng((params.seed, step, shard))
         first = step * params.batch + shard
         chosen = [index % len(samples["scene"]) for index in range(first, (step + 1) * params.batch, SHARDS)]
-        crops = np.stack([_crop(params, samples, index, scenes, rng) for index in chosen])
+        crops = np.stack([cut_crop(params, samples, index, scenes, rng) for index in chosen])
         labels = torch.from_numpy(samples["labels"][chosen].astype(np.int64))
         with autocast(params.precision):
-            logits = _upright(net, crops, params.flip and bool(rng.random() < 0.5))
+            logits = upright_logits(net, crops, params.flip and bool(rng.random() < 0.5))
         return balanced_cross_entropy(logits.permute(1, 0, 2, 3).reshape(2, -1), labels.reshape(-1))
 
     curve = fit(net, loss, params, monitor or Silent())
@@ -56,14 +56,18 @@ def _layers(images: Arrays, disparity: Arrays) -> NDArray[np.float32]:
     return evaluation_layers(images["left"], images["moments"][0], disparity["disparity"])
 
 
-def _crop(
+def cut_crop(
     params: EvaluationNetParams,
     samples: Arrays,
     index: int,
     scenes: Sequence[NDArray[np.float32]],
     rng: np.random.Generator,
 ) -> NDArray[np.float32]:
-    """Cut out what the grid of sample ``index`` depends on; beyond the image the nearest pixel, as in inference."""
+    """Cut out what the grid of one sample depends on; beyond the image the nearest pixel, as in inference.
+
+    Returns:
+        float32 (layer, 101 + 16 (rows - 1), 101 + 16 (columns - 1)).
+    """
     scene = scenes[int(samples["scene"][index])]
     rows, columns = (
         np.clip(np.arange(first - RADIUS, first - RADIUS + PATCH + STRIDE * (count - 1)), 0, length - 1)
@@ -77,7 +81,7 @@ def _crop(
     return relight(scene[:, rows[:, None], columns], params.relight, rng)
 
 
-def _upright(net: EvaluationNet, crops: NDArray[np.float32], flipped: bool) -> Tensor:
+def upright_logits(net: EvaluationNet, crops: NDArray[np.float32], flipped: bool) -> Tensor:
     """Return the logits of crops; flipped, of the crops upside down, in the order of the upright ones."""
     layers = torch.from_numpy(crops[:, :, ::-1].copy() if flipped else crops)
     logits: Tensor = net(layers.contiguous(memory_format=torch.channels_last))

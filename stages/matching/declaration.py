@@ -42,7 +42,9 @@ class MatchingNetParams(Schedule):
 
     steps: int = Field(1200, ge=1, description="optimiser steps")
     head: Head = Field("compact", description="hidden layers: 128 units, or the paper's 1600 and 128")
-    batch: int = Field(6, ge=SHARDS, description="samples a step; a multiple of the number of shards")
+    batch: int = Field(
+        6, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"
+    )
     relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting a view; 0: none, as the paper")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
     seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")

@@ -28,6 +28,7 @@ from torch.nn import functional
 
 from stages.matching.declaration import Head
 from stages.parameters import count, from_vector
+from stages.precision import autocast
 from stages.stage import StageError
 
 HEADS: tuple[Head, ...] = ("compact", "paper")
@@ -108,7 +109,9 @@ class MatchingNet(nn.Module):
         """
         weight = (self.out.weight[1] - self.out.weight[0]).float().reshape(128)
         bias = self._output_bias()
-        return torch.einsum("bchw,c->bhw", self.describe(joined).float(), weight) + bias
+        features = self.describe(joined)
+        with autocast("float32"):  # einsum is a product of matrices, which autocast would bring back to bfloat16
+            return torch.einsum("bchw,c->bhw", features.float(), weight) + bias
 
     def _output_bias(self) -> Tensor:
         if self.out.bias is None:

@@ -13,6 +13,9 @@ Where the right view has ground truth, half the samples are *mirrored*: both vie
 exchanged, which is again a rectified pair.
 """
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,43 +48,82 @@ def draw_samples(params: MatchingSamplesParams, inputs: Inputs) -> dict[str, NDA
         StageError: if a crop does not fit into a scene, or a scene has no pixel to learn from.
     """
     rng = np.random.default_rng(params.seed)
-    scenes = by_scene(inputs, "truth")
+    scenes = [_Scene(truth, params) for truth in by_scene(inputs, "truth")]
     order = rng.permutation(np.arange(params.samples) % len(scenes))
-    drawn = [_draw(params, scenes[scene], rng) for scene in order]
+    drawn = [_draw(scenes[scene], rng) for scene in order]
     columns = {name: np.stack([sample[name] for sample in drawn]) for name in drawn[0]}
     return {"scene": order.astype(np.int32), **columns}
 
 
-def _draw(params: MatchingSamplesParams, truth: Arrays, rng: np.random.Generator) -> dict[str, NDArray[np.generic]]:
+@dataclass(frozen=True)
+class _Side:
+    """What can be learnt from one orientation of a scene: looked for once, not for each sample."""
+
+    visible: NDArray[np.float32]  # y x, px
+    candidates: NDArray[np.int32]  # flat indices of the pixels of known truth
+
+    @classmethod
+    def of(cls, visible: NDArray[np.float32], crop: tuple[int, int]) -> "_Side":
+        """Find the candidates.
+
+        Raises:
+            StageError: if there is none, or a crop does not fit.
+        """
+        candidates = np.flatnonzero(np.isfinite(visible)).astype(np.int32)
+        if not len(candidates):
+            raise StageError("a training scene has no pixel with a known disparity that both views see")
+        if crop[0] > visible.shape[0] or crop[1] > visible.shape[1]:
+            raise StageError(f"a crop of {crop} px does not fit into a training scene of {visible.shape} px")
+        return cls(visible, candidates)
+
+    def corner(self, crop: tuple[int, int], rng: np.random.Generator) -> tuple[int, int]:
+        """Return the corner of a crop that holds a random pixel of known truth, at a random place in the crop."""
+        shape = np.array(self.visible.shape)
+        pixel = np.array(np.unravel_index(rng.choice(self.candidates), self.visible.shape))
+        y, x = np.clip(pixel - rng.integers(0, crop), 0, shape - crop)
+        return int(y), int(x)
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """A training scene, upright and, where samples may be mirrored, mirrored."""
+
+    truth: Arrays
+    params: MatchingSamplesParams
+
+    @cached_property
+    def upright(self) -> _Side:
+        return _Side.of(visible_truth(self.truth, mirrored=False), self.params.crop)
+
+    @cached_property
+    def mirrored(self) -> _Side | None:
+        """None where the right view has no truth, or samples are not to be mirrored."""
+        if not (self.params.mirror and np.any(self.truth["right_nonocc"])):
+            return None
+        return _Side.of(visible_truth(self.truth, mirrored=True), self.params.crop)
+
+    def side(self, rng: np.random.Generator) -> _Side:
+        """Return one of the sides there are, each as likely as the other."""
+        return self.upright if self.mirrored is None or rng.random() >= 0.5 else self.mirrored
+
+
+def _draw(scene: _Scene, rng: np.random.Generator) -> dict[str, NDArray[np.generic]]:
     """Draw one sample of one scene, around a pixel whose truth is known."""
-    mirrored = params.mirror and bool(np.any(truth["right_nonocc"])) and bool(rng.random() < 0.5)
-    visible = visible_truth(truth, mirrored)
-    y, x = _corner(visible, params.crop, rng)
-    crop = visible[y : y + params.crop[0], x : x + params.crop[1]]
+    params = scene.params
+    side = scene.side(rng)
+    y, x = side.corner(params.crop, rng)
+    crop = side.visible[y : y + params.crop[0], x : x + params.crop[1]]
     known = crop[np.isfinite(crop)]
-    low, high = (int(bound) for bound in truth["range"])
+    low, high = (int(bound) for bound in scene.truth["range"])
     pick = _patch_slots if params.form == "patch" else _dense_slots
     slots = pick(known, low, high, params.disparities, rng)
     return {
-        "mirrored": np.array(mirrored),
+        "mirrored": np.array(side is scene.mirrored),
         "y": np.array(y, np.int32),
         "x": np.array(x, np.int32),
         "disparities": slots.astype(np.int32),
         "truth": np.ascontiguousarray(crop, np.float32),
     }
-
-
-def _corner(visible: NDArray[np.float32], crop: tuple[int, int], rng: np.random.Generator) -> tuple[int, int]:
-    """Return the corner of a crop that holds a random pixel of known truth, at a random place in the crop."""
-    candidates = np.flatnonzero(np.isfinite(visible))
-    if not len(candidates):
-        raise StageError("a training scene has no pixel with a known disparity that both views see")
-    spare = np.array(visible.shape) - crop
-    if (spare < 0).any():
-        raise StageError(f"a crop of {crop} px does not fit into a training scene of {visible.shape} px")
-    pixel = np.array(np.unravel_index(rng.choice(candidates), visible.shape))
-    y, x = np.clip(pixel - rng.integers(0, crop), 0, spare)
-    return int(y), int(x)
 
 
 def _patch_slots(

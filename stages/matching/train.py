@@ -49,7 +49,7 @@ def train_matching_net(
         rng = np.random.default_rng((params.seed, step, shard))
         first = step * params.batch + shard
         chosen = range(first, (step + 1) * params.batch, SHARDS)
-        crops = [_crop(samples, index % len(samples["scene"]), scenes, params.relight, rng) for index in chosen]
+        crops = [cut_crop(samples, index % len(samples["scene"]), scenes, params.relight, rng) for index in chosen]
         with autocast(params.precision):
             return balanced_loss(net, crops)
 
@@ -75,14 +75,22 @@ class Crop:
         self.labels = labels  # slot h w: 0 match, 1 mismatch, IGNORED
 
 
-def _crop(
+def cut_crop(
     samples: Arrays,
     index: int,
     scenes: Sequence[NDArray[np.float32]],
     strength: float,
     rng: np.random.Generator,
 ) -> Crop:
-    """Cut sample ``index`` out of its scene, with another light on each view."""
+    """Cut one sample out of its scene, with another light on each view.
+
+    Args:
+        samples: arrays as ``draw_samples`` makes them.
+        index: the sample.
+        scenes: float32 (view, channel, y, x) of each training scene. Beyond an image comes its nearest pixel.
+        strength: of the random lighting; 0 for none.
+        rng: source of that lighting.
+    """
     views = scenes[int(samples["scene"][index])]
     if samples["mirrored"][index]:
         views = views[::-1, :, :, ::-1]

@@ -4,16 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.kernel import kernel
-from stages.stage import StageError
 from stages.transforms.gray import require_gray
+from stages.transforms.rays import LINES, require_rays
 from stages.transforms.window import require_window
-
-LINES = {
-    4: ((0, 1), (1, 0)),
-    8: ((0, 1), (1, 0), (1, 1), (1, -1)),
-    16: ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)),
-}
-"""Steps (dy, dx) of the lines by number of rays: a line is two opposite rays."""
 
 
 def companion(gray: NDArray[np.uint8], window: int = 61, rays: int = 8) -> NDArray[np.float32]:
@@ -51,17 +44,6 @@ def companion(gray: NDArray[np.uint8], window: int = 61, rays: int = 8) -> NDArr
     for dy, dx in LINES[require_rays(rays)]:
         _count(np.ascontiguousarray(gray), dy, dx, radius // max(abs(dy), abs(dx)), same, seen)
     return (same / np.maximum(seen, 1)).astype(np.float32)
-
-
-def require_rays(rays: int) -> int:
-    """Return the number of rays if there is a definition of it.
-
-    Raises:
-        StageError: if it is not 4, 8 or 16.
-    """
-    if rays not in LINES:
-        raise StageError(f"rays is {rays}, expected one of {', '.join(map(str, LINES))}")
-    return rays
 
 
 @kernel

@@ -70,12 +70,18 @@ def read_weights(product: str, data: bytes) -> NDArray[np.float32]:
     try:
         tensors = load_tensors(data)
     except (SafetensorError, ValueError, KeyError) as error:
-        raise StageError(f"the weights of {product} are no safetensors file: {error}") from None
+        raise StageError(f"the weights of {product} are no safetensors file: {_one_line(str(error))}") from None
     for net in candidates(product):
         expected = net.state_dict()
         if {name: tensor.shape for name, tensor in tensors.items()} == {n: t.shape for n, t in expected.items()}:
             return _vector(product, net, tensors)
-    raise StageError(f"the weights of {product} have other tensors than its network: {', '.join(sorted(tensors)[:4])}…")
+    names = _one_line(", ".join(sorted(tensors)[:4]))
+    raise StageError(f"the weights of {product} have other tensors than its network, or of other shapes: {names}…")
+
+
+def _one_line(text: str, longest: int = 120) -> str:
+    """Return text that a file may have chosen, fit for a message: printable, on one line, not endless."""
+    return "".join(letter if letter.isprintable() else " " for letter in text[:longest])
 
 
 def _vector(product: str, net: nn.Module, tensors: Mapping[str, torch.Tensor]) -> NDArray[np.float32]:

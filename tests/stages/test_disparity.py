@@ -4,7 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from stages.disparity import DISPARITY, DisparityParams, refine_subpixel, winner_take_all
+from stages.disparity import refine_subpixel, winner_take_all
+from stages.disparity_declaration import DISPARITY, DisparityParams
 from stages.stage import StageError
 from tests.stages.tiling import same, tiled, whole
 

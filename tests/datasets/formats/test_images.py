@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from PIL.ImageFile import ImageFile
 
 from datasets.errors import ImageError, MissingFileError
 from datasets.formats import images, limits
@@ -40,10 +41,10 @@ def palette() -> Image.Image:
     return image
 
 
-def turned(form: str, orientation: int) -> bytes:
+def turned(form: str, orientation: int, image: Image.Image | None = None) -> bytes:
     exif = Image.Exif()
     exif[0x0112] = orientation
-    return encode(Image.fromarray(GRAY), form, exif=exif)
+    return encode(image or Image.fromarray(GRAY), form, exif=exif)
 
 
 @pytest.mark.parametrize(
@@ -53,6 +54,7 @@ def turned(form: str, orientation: int) -> bytes:
         pytest.param(encode(Image.fromarray(RGB)), RGB, id="8-bit RGB"),
         pytest.param(encode(Image.fromarray(DEEP)), DEEP, id="16-bit gray PNG stays 16-bit"),
         pytest.param(encode(Image.fromarray(DEEP), "TIFF"), DEEP, id="16-bit gray TIFF stays 16-bit"),
+        pytest.param(encode(Image.fromarray(DEEP), "TIFF", compression="tiff_lzw"), DEEP, id="compressed TIFF"),
         pytest.param(b"P5\n3 2\n65535\n" + DEEP.astype(">u2").tobytes(), DEEP, id="16-bit PGM stays 16-bit"),
         pytest.param(b"P6\n3 2\n255\n" + RGB.tobytes(), RGB, id="PPM"),
         pytest.param(encode(Image.fromarray(RGB), "BMP"), RGB, id="BMP"),
@@ -87,6 +89,8 @@ def test_reads_what_is_stored(tmp_path: Path, content: bytes, expected: np.ndarr
         pytest.param(6, np.rot90(GRAY, -1), id="turn clockwise"),
         pytest.param(7, np.rot90(GRAY, 2).T, id="transversed"),
         pytest.param(8, np.rot90(GRAY), id="turn anticlockwise"),
+        pytest.param(0, GRAY, id="0, which legacy writers use for unknown"),
+        pytest.param(9, GRAY, id="9, which means nothing"),
     ],
 )
 def test_applies_the_exif_orientation(tmp_path: Path, form: str, orientation: int, expected: np.ndarray) -> None:
@@ -94,6 +98,46 @@ def test_applies_the_exif_orientation(tmp_path: Path, form: str, orientation: in
     path.write_bytes(turned(form, orientation))
     np.testing.assert_array_equal(read_image(path), expected)
     assert image_size(path) == expected.shape
+
+
+@pytest.mark.parametrize(
+    "image, expected",
+    [
+        pytest.param(palette(), [[[200, 100, 50], [10, 20, 30]]], id="palette: the sides swap, not the channels"),
+        pytest.param(Image.merge("LA", [Image.fromarray(GRAY)] * 2), GRAY[:, ::-1], id="gray with alpha"),
+        pytest.param(Image.fromarray(RGB), RGB[:, ::-1], id="colour"),
+        pytest.param(Image.fromarray(DEEP), DEEP[:, ::-1], id="16-bit gray"),
+    ],
+)
+def test_mirrors_what_is_left_after_the_conversion(tmp_path: Path, image: Image.Image, expected: np.ndarray) -> None:
+    path = tmp_path / "image.png"
+    path.write_bytes(turned("PNG", 2, image))
+    np.testing.assert_array_equal(read_image(path), expected)
+
+
+def test_an_orientation_after_the_pixels_does_not_count(tmp_path: Path) -> None:
+    content = turned("PNG", 6)
+    start = content.index(b"eXIf") - 4
+    end = start + 12 + int.from_bytes(content[start : start + 4], "big")
+    path = tmp_path / "image.png"
+    path.write_bytes(content[:start] + content[end:-12] + content[start:end] + content[-12:])
+    np.testing.assert_array_equal(read_image(path), GRAY)
+    assert image_size(path) == GRAY.shape
+
+
+def test_no_other_decoder_is_chosen_by_what_is_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Greedy(ImageFile):
+        format = "GREEDY"
+
+        def _open(self) -> None:
+            self._size, self._mode = (9, 9), "L"
+
+    path = tmp_path / "image.png"
+    path.write_bytes(encode(Image.fromarray(GRAY)))
+    monkeypatch.setattr(Image, "ID", ["GREEDY", *Image.ID])
+    monkeypatch.setitem(Image.OPEN, "GREEDY", (Greedy, None))
+    with pytest.raises(ImageError, match="reads as PNG and as GREEDY"):
+        read_image(path)
 
 
 def test_jpeg_is_read_upright(tmp_path: Path) -> None:

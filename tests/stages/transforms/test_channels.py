@@ -3,8 +3,9 @@ import pytest
 from pydantic import ValidationError
 
 from stages.stage import StageError
-from stages.transforms.channels import CHANNELS, ChannelsParams, channels
+from stages.transforms.channels import channels
 from stages.transforms.companion import companion
+from stages.transforms.declaration import CHANNELS, ChannelsParams
 from stages.transforms.gray import gray_moments, to_gray
 from stages.transforms.rank import rank
 from tests.stages.tiling import same, tiled, whole

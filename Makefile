@@ -1,0 +1,37 @@
+# `make demo` and `make test` set everything up; the rest works on top of that.
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/.ready
+
+.PHONY: demo test lint train bench wheel clean
+
+demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
+	$(BIN)/pipeline run motorcycle --output demo
+
+test: $(READY)  ## run the tests
+	$(BIN)/python -m pytest tests
+
+lint: $(READY)  ## style, types, and who may import whom
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+train: $(READY)  ## DATA=DIR: train both networks on DIR/2001, 2003, 2005 and 2006, and put the weights in place
+	@test -n "$(DATA)" || { echo "make train: say where the Middlebury sets are: make train DATA=DIR"; exit 2; }
+	$(BIN)/pipeline run middlebury:$(DATA) --train --upto evaluation_net --output build/weights
+	cp build/weights/*.safetensors stages/weights/
+
+bench: $(READY)  ## DATA=DIR (optional): the measured figures of the README
+	$(BIN)/python -m benchmarks.precision $(if $(DATA),middlebury:$(DATA)/MiddEval3/trainingQ,motorcycle)
+
+wheel: $(READY)
+	$(BIN)/python -m pip wheel --no-deps --wheel-dir dist .
+
+clean:
+	rm -rf .venv build dist demo *.egg-info
+
+$(READY): pyproject.toml constraints.txt
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@touch $@

@@ -1,0 +1,295 @@
+"""The command line. Nothing heavy is imported before a command runs: ``--help`` must answer at once."""
+
+import signal
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from pipeline.api import Result, Task
+    from pipeline.plan import Plan
+
+app = typer.Typer(
+    help="Semi-dense stereo matching with two CNNs; every stage is cached.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+cache_app = typer.Typer(help="Look into the cache.", no_args_is_help=True)
+data_app = typer.Typer(help="Look at datasets.", no_args_is_help=True)
+app.add_typer(cache_app, name="cache")
+app.add_typer(data_app, name="data")
+
+DatasetArgument = Annotated[str, typer.Argument(help="Such as motorcycle or middlebury:DIR; see `pipeline data list`.")]
+SceneOption = Annotated[list[str] | None, typer.Option("--scene", help="Only this scene; may be repeated.")]
+SetOption = Annotated[list[str] | None, typer.Option("--set", help="section.field=value; may be repeated.")]
+ConfigOption = Annotated[Path | None, typer.Option("--config", help="A TOML file with the same sections.")]
+CacheOption = Annotated[
+    Path | None, typer.Option("--cache", help="The cache's folder [default: $PIPELINE_CACHE, else the user's].")
+]
+TrainOption = Annotated[bool, typer.Option("--train", help="Train the networks; the shipped weights are not used.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else, on stdout.")]
+OutputOption = Annotated[
+    Path | None, typer.Option("--output", "-o", help="Write maps, metrics and configuration to this folder.")
+]
+SchedulerOption = Annotated[
+    str | None, typer.Option("--scheduler", help="A Dask scheduler, tcp://HOST:PORT; the cache must be shared.")
+]
+WorkersOption = Annotated[int | None, typer.Option("--workers", min=1, help="Threads [default: one a core].")]
+UptoOption = Annotated[str, typer.Option("--upto", help="The product to stop at.")]
+ForceOption = Annotated[
+    list[str] | None, typer.Option("--force", help="Make this product again, and compare; may be repeated.")
+]
+DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Only say what would be reused and made.")]
+ProductArgument = Annotated[str, typer.Argument(help="Such as costvolume, disparity or confidence.")]
+
+
+@app.command()
+def run(
+    dataset: DatasetArgument = "motorcycle",
+    upto: UptoOption = "metrics",
+    scene: SceneOption = None,
+    settings: SetOption = None,
+    config: ConfigOption = None,
+    train: TrainOption = False,
+    dry_run: DryRunOption = False,
+    force: ForceOption = None,
+    output: OutputOption = None,
+    scheduler: SchedulerOption = None,
+    workers: WorkersOption = None,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Make a dataset's products up to --upto, reusing all that is cached."""
+    from pipeline import api, console
+    from pipeline.progress import ProgressWatch
+
+    task = _task(dataset, scene, settings, config, train, cache)
+    if dry_run:
+        return _print_plan(api.status(task, upto, force or ()), as_json)
+    with ProgressWatch() as watch:
+        result = api.run(task, upto, forced=force or (), watch=watch, scheduler=scheduler, workers=workers)
+    files = _export(result, output)
+    if as_json:
+        steps = console.step_rows(result.plan, result.made)
+        console.print_json({"steps": steps, "metrics": result.metrics, "files": [str(file) for file in files]})
+    else:
+        _print_result(result, files)
+    return None
+
+
+@app.command()
+def sweep(
+    dataset: DatasetArgument = "motorcycle",
+    thresholds: Annotated[str, typer.Option("--R", help="first:last:step, or numbers with commas.")] = "0.05:0.95:0.05",
+    scene: SceneOption = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="section.field=value1,value2; all combinations are made.")
+    ] = None,
+    config: ConfigOption = None,
+    train: TrainOption = False,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Where sweep.csv and sweep.png go.")] = Path("sweep"),
+    scheduler: SchedulerOption = None,
+    workers: WorkersOption = None,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Filter at many thresholds R, and over several values of any setting; say what was reused."""
+    from pipeline import api, console
+    from pipeline.progress import ProgressWatch
+    from pipeline.sweep import print_sweep, write_sweep
+
+    task = _task(dataset, scene, None, config, train, cache)
+    with ProgressWatch() as watch:
+        result = api.sweep(task, thresholds, settings or (), watch=watch, scheduler=scheduler, workers=workers)
+    files = write_sweep(result.metrics, output)
+    if as_json:
+        steps = console.step_rows(result.plan, result.made)
+        console.print_json({"steps": steps, "metrics": result.metrics, "files": [str(file) for file in files]})
+    else:
+        print_sweep(result.metrics, api.mask_kinds(result))
+        _say_files(files)
+        print(console.reuse_line(result.made.values()))
+
+
+@app.command()
+def status(
+    dataset: DatasetArgument = "motorcycle",
+    upto: UptoOption = "metrics",
+    scene: SceneOption = None,
+    settings: SetOption = None,
+    config: ConfigOption = None,
+    train: TrainOption = False,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say of every product whether it is cached, and if not, what changed."""
+    from pipeline import api
+
+    _print_plan(api.status(_task(dataset, scene, settings, config, train, cache), upto), as_json)
+
+
+@app.command()
+def explain(
+    product: ProductArgument,
+    dataset: DatasetArgument = "motorcycle",
+    scene: SceneOption = None,
+    settings: SetOption = None,
+    config: ConfigOption = None,
+    train: TrainOption = False,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show what a product's key is made of."""
+    from pipeline import api
+    from pipeline.explain import explanation, print_explanation
+
+    planned = api.explain(_task(dataset, scene, settings, config, train, cache), product)
+    found = explanation(planned, api.open_store(cache))
+    if as_json:
+        from pipeline.console import print_json
+
+        print_json(found)
+    else:
+        print_explanation(found)
+
+
+@app.command()
+def inspect(
+    product: ProductArgument,
+    dataset: DatasetArgument = "motorcycle",
+    scene: SceneOption = None,
+    png: Annotated[Path | None, typer.Option("--png", help="Draw the product into this file.")] = None,
+    pixel: Annotated[str | None, typer.Option("--pixel", help="Y,X: whose cost curve to draw.")] = None,
+    disparity: Annotated[int | None, typer.Option("--disparity", help="Which cost slice to draw, px.")] = None,
+    settings: SetOption = None,
+    config: ConfigOption = None,
+    train: TrainOption = False,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show a cached product: its xarray, statistics, a picture, and how to open it in Python."""
+    from pipeline import api
+    from pipeline.inspect import draw, inspection, print_inspection
+
+    planned = api.explain(_task(dataset, scene, settings, config, train, cache), product)
+    found = inspection(planned, api.open_store(cache))
+    if png:
+        draw(found, png, pixel, disparity)
+    print_inspection(found, png, as_json)
+
+
+@cache_app.command("ls")
+def cache_ls(cache: CacheOption = None, as_json: JsonOption = False) -> None:
+    """List the entries: product, scene, size, age, key."""
+    from pipeline.cachetools import list_entries
+
+    list_entries(cache, as_json)
+
+
+@cache_app.command("verify")
+def cache_verify(cache: CacheOption = None, as_json: JsonOption = False) -> None:
+    """Read every entry and compare it with what was published; exit with 1 if one is damaged."""
+    from pipeline.cachetools import verify_entries
+
+    if not verify_entries(cache, as_json):
+        raise typer.Exit(1)
+
+
+@cache_app.command("size")
+def cache_size(cache: CacheOption = None, as_json: JsonOption = False) -> None:
+    """Say how much space each product takes."""
+    from pipeline.cachetools import print_sizes
+
+    print_sizes(cache, as_json)
+
+
+@data_app.command("list")
+def data_list(
+    dataset: Annotated[str | None, typer.Argument(help="List the scenes of this dataset.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """List the datasets that can be named, or the scenes of one."""
+    from pipeline.datalist import list_datasets, list_scenes
+
+    list_scenes(dataset, as_json) if dataset else list_datasets(as_json)
+
+
+def _task(
+    dataset: str,
+    scenes: list[str] | None,
+    settings: list[str] | None,
+    config: Path | None,
+    train: bool,
+    cache: Path | None,
+) -> "Task":
+    from pipeline.api import Task
+
+    return Task(dataset, tuple(scenes or ()), tuple(settings or ()), config, train, cache)
+
+
+def _print_plan(plan: "Plan", as_json: bool) -> None:
+    from pipeline import console
+
+    if as_json:
+        console.print_json({"steps": console.step_rows(plan, {}), "metrics": []})
+    else:
+        console.print_plan(plan)
+
+
+def _print_result(result: "Result", files: list[Path]) -> None:
+    from pipeline import api, console
+
+    console.print_metrics(result.metrics, api.mask_kinds(result))
+    console.print_notes(result.plan.notes)
+    _say_files(files)
+    print(console.reuse_line(result.made.values()))
+
+
+def _say_files(files: list[Path]) -> None:
+    for file in files:
+        print(f"wrote {file}")
+
+
+def _export(result: "Result", output: Path | None) -> list[Path]:
+    if output is None:
+        return []
+    from pipeline.export import export
+
+    return export(result, output)
+
+
+class _Terminated(BaseException):
+    """SIGTERM arrived."""
+
+
+def _terminate(*_: Any) -> None:  # noqa: ANN401
+    raise _Terminated
+
+
+def main() -> None:
+    """Run the command line; a user's mistake is one line and exit code 2."""
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        app()
+    except (KeyboardInterrupt, _Terminated) as stop:
+        _leave(130 if isinstance(stop, KeyboardInterrupt) else 143)
+    except Exception as error:
+        from pipeline.errors import USER_ERRORS
+
+        if not isinstance(error, USER_ERRORS):
+            raise
+        print(f"pipeline: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+
+
+def _leave(code: int) -> None:
+    """Exit at once: drafts are deleted by now, and tasks that still compute have nothing left to write to."""
+    import os
+
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)

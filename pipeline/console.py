@@ -1,0 +1,163 @@
+"""Print results: tables for people, one JSON object for scripts. Results go to stdout."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from cache import Change
+from pipeline.execute import totals
+from pipeline.plan import Plan, Planned
+from pipeline.tasks import Made
+
+STYLES = {"hit": "green", "made": "cyan", "stale": "yellow", "missing": "dim"}
+
+
+def results() -> Console:
+    """Return the console for results: as wide as the terminal, wide enough for any table elsewhere."""
+    return Console(highlight=False) if Console().is_terminal else Console(highlight=False, width=200)
+
+
+def print_json(value: Mapping[str, Any]) -> None:
+    """Print one JSON object, and nothing else."""
+    Console(soft_wrap=True).out(json.dumps(value, allow_nan=False), highlight=False)
+
+
+def step_rows(plan: Plan, made: Mapping[str, Made]) -> list[dict[str, Any]]:
+    """Return the rows that ``run`` and ``status`` promise to scripts: product, scene, key, state, changed, seconds."""
+    return [_step_row(planned, made.get(planned.step.id)) for planned in plan.steps]
+
+
+def _step_row(planned: Planned, made: Made | None) -> dict[str, Any]:
+    fresh = made is not None and not made.reused
+    state = "made" if fresh else "hit" if made else planned.state
+    return {
+        "product": planned.step.product,
+        "scene": planned.step.scene,
+        "key": made.key if made else planned.key,
+        "state": state,
+        "changed": [_change_row(change) for change in planned.changed],
+        **({"damage": planned.damage} if planned.damage else {}),
+        "seconds": made.seconds if made else planned.seconds,
+    }
+
+
+def _change_row(change: Change) -> dict[str, Any]:
+    return {"field": change.field, "old": change.old, "new": change.new}
+
+
+def print_plan(plan: Plan) -> None:
+    """Print a line a product and scene: its state, its key, and why it is not a hit."""
+    table = Table("product", "scene", "state", "key", "why", box=None, pad_edge=False)
+    for planned in plan.steps:
+        state = f"[{STYLES[planned.state]}]{planned.state}[/]"
+        table.add_row(planned.step.product, planned.step.scene, state, (planned.key or "")[:12], why(planned))
+    console = results()
+    console.print(table)
+    print_notes(plan.notes)
+    todo: dict[str, int] = {}
+    for planned in plan.todo():
+        todo[planned.step.product] = todo.get(planned.step.product, 0) + 1
+    hits = len(plan.steps) - len(plan.todo())
+    making = ", ".join(f"{count} {product}" for product, count in todo.items()) or "nothing"
+    console.print(f"reuses {hits} products, makes {making}", highlight=False)
+
+
+def why(planned: Planned) -> str:
+    """Return why a step is not a hit, in one line; nothing for a hit."""
+    if planned.damage:
+        return f"damaged: {planned.damage}"
+    if planned.state == "missing":
+        return "never made" if planned.key else "never made; its inputs are not there yet"
+    return "; ".join(str(change) for change in _telling(planned.changed))
+
+
+def _telling(changes: Sequence[Change], most: int = 3) -> Iterable[object]:
+    """Return the first changes, and how many more there are."""
+    yield from changes[:most]
+    if len(changes) > most:
+        yield f"and {len(changes) - most} more"
+
+
+def print_notes(notes: Sequence[str]) -> None:
+    """Print what a person should know; many of a kind in one line."""
+    console = Console(stderr=True, soft_wrap=True)
+    for note in notes[:5]:
+        console.print(f"note: {note}", highlight=False, style="dim")
+    if len(notes) > 5:
+        console.print(f"note: and {len(notes) - 5} more like these", style="dim", highlight=False)
+
+
+def reuse_line(made: Iterable[Made]) -> str:
+    """Return one line that says what was reused and what was made."""
+    counts = totals(made)
+    reused = sum(old for old, _ in counts.values())
+    fresh = ", ".join(f"{new} {product}" for product, (_, new) in counts.items() if new)
+    return f"reused {reused} products, made {fresh or 'nothing'}"
+
+
+FIGURES = ("raw_bad", "bad", "invalid", "avgerr", "rms", "auc", "auc_optimal")
+HEADINGS = {
+    "raw_bad": "raw bad %",
+    "bad": "bad %",
+    "invalid": "invalid %",
+    "avgerr": "avgerr px",
+    "rms": "rms px",
+    "auc": "AUC",
+    "auc_optimal": "AUC optimal",
+}
+
+
+def print_metrics(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -> None:
+    """Print the table of metrics: non-occluded pixels, every threshold, and the mean of several scenes.
+
+    Args:
+        rows: as ``run --json`` gives them.
+        masks: where the mask of each scene comes from.
+    """
+    rows = [row for row in rows if row["mask"] == "nonocc"]
+    if not rows:
+        return
+    table = Table("scene", "threshold px", "R", *(HEADINGS[name] for name in FIGURES), "pixels", box=None)
+    for column in table.columns[1:]:
+        column.justify = "right"
+    for row in [*rows, *mean_rows(rows)]:
+        table.add_row(*_cells(row))
+    console = results()
+    console.print(table)
+    kinds = ", ".join(sorted(set(masks.values())))
+    console.print(
+        f"mask: nonocc ({kinds}); bad and errors are of reported pixels, raw bad counts unreported ones as wrong; "
+        "thresholds in pixels of the image at hand",
+        style="dim",
+        highlight=False,
+    )
+
+
+def mean_rows(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return the mean over scenes for each threshold, mask, R and variant; nothing for a single scene."""
+    if len({row["scene"] for row in rows}) < 2:
+        return []
+    groups: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row.get(name) for name in ("variant", "mask", "threshold_px", "R")), []).append(row)
+    return [_mean(group) for group in groups.values()]
+
+
+def _mean(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the mean of each figure over the scenes that have it."""
+    means: dict[str, float] = {}
+    for name in FIGURES:
+        values = [row[name] for row in rows if name in row]
+        means |= {name: sum(values) / len(values)} if values else {}
+    pixels = sum(row["pixels"] for row in rows)
+    return {**rows[0], "scene": f"mean of {len(rows)}", "pixels": pixels} | means
+
+
+def _cells(row: Mapping[str, Any]) -> list[str]:
+    digits = {"auc": 4, "auc_optimal": 4, "avgerr": 2, "rms": 2}
+    figures = [f"{row[name]:.{digits.get(name, 1)}f}" if name in row else "-" for name in FIGURES]
+    threshold = f"{row['R']:g}" if "R" in row else "-"
+    return [row["scene"], f"{row['threshold_px']:g}", threshold, *figures, str(row["pixels"])]

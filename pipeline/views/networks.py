@@ -1,0 +1,62 @@
+"""Figures of trained networks: how they learnt; of networks without a curve, what their parameters are like."""
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+from numpy.typing import NDArray
+
+from pipeline.views.colours import BLUE, QUIET, RED
+
+_COIN = float(np.log(2))
+"""The loss of a network that has learnt nothing, nats."""
+
+
+def draw_network(figure: Figure, dataset: xr.Dataset) -> None:
+    """Draw the loss of each training step; of shipped weights, which bring no curve, the parameters."""
+    figure.set_size_inches(10, 5)
+    if "loss" in dataset:
+        _draw_loss(figure.subplots(), dataset["loss"].values)
+    else:
+        _draw_parameters(figure.subplots(1, 2), dataset["parameters"].values)
+
+
+def _draw_loss(axes: Axes, loss: NDArray[np.float32]) -> None:
+    window = loss.size // 20
+    smooth = window > 1
+    axes.plot(np.arange(1, loss.size + 1), loss, color=QUIET if smooth else BLUE, linewidth=0.9, label="each step")
+    if smooth:
+        steps = np.arange(window, loss.size + 1)
+        axes.plot(steps, trailing_mean(loss, window), color=BLUE, linewidth=2, label=f"mean of the last {window} steps")
+    axes.axhline(_COIN, color=RED, linestyle="--", linewidth=1.2, label="ln 2: a coin's guess")
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set(
+        xlabel="training step", ylabel="class-balanced cross-entropy (nats, log scale)", xlim=(1, max(loss.size, 2))
+    )
+    axes.grid(alpha=0.3)
+    axes.legend()
+
+
+def trailing_mean(values: NDArray[np.float32], window: int) -> NDArray[np.float64]:
+    """Return the mean of each value and the ``window - 1`` before it, from the first that has so many: float64.
+
+    >>> trailing_mean(np.array([1, 3, 5], np.float32), 2).tolist()
+    [2.0, 4.0]
+    """
+    return np.convolve(values.astype(np.float64), np.full(window, 1 / window), mode="valid")
+
+
+def _draw_parameters(axes: NDArray[np.object_], parameters: NDArray[np.float32]) -> None:
+    values, sizes = axes
+    values.hist(parameters, 80, color=BLUE)
+    values.set(xlabel="value of a parameter", ylabel="parameters (log scale)", yscale="log")
+    values.set_title(f"{parameters.size:,} parameters: {parameters.mean():.3g} ± {parameters.std():.3g}")
+    nonzero = np.abs(parameters[parameters != 0])
+    sizes.hist(np.log10(nonzero), 80, color=BLUE)
+    sizes.set(xlabel="log10 of a parameter's size", ylabel="parameters")
+    sizes.set_title(f"sizes; {parameters.size - nonzero.size:,} are zero")

@@ -1,0 +1,46 @@
+"""Write pictures, completely or not at all."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
+
+from datasets.formats.atomic import atomic_write
+from pipeline.errors import UsageError
+
+
+@contextmanager
+def explaining(path: Path) -> Iterator[None]:
+    """Turn the file system's refusal to write ``path`` into one line for the user.
+
+    Raises:
+        UsageError: with the path and the system's reason.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written ({error.strerror or error}); name another place") from error
+
+
+def save_png(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG; an existing file is replaced, a reader sees the old one or the new one.
+
+    Raises:
+        UsageError: if the file cannot be written.
+    """
+    with explaining(path), atomic_write(path) as file:
+        figure.savefig(file, format="png")
+
+
+def write_rgb(rgb: NDArray[np.uint8], path: Path) -> None:
+    """Write colours (y, x, 3) uint8 as a PNG of the same number of pixels; an existing file is replaced.
+
+    Raises:
+        UsageError: if the file cannot be written.
+    """
+    with explaining(path), atomic_write(path) as file:
+        Image.fromarray(rgb).save(file, "PNG")
