@@ -1,9 +1,9 @@
-"""Read an entry's arrays through its manifest alone. Imports zarr and xarray: loaded when data are opened."""
+"""Read an entry's arrays through its manifest alone. Imports zarr: loaded when data are opened."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import xarray as xr
+import zarr
 from zarr.storage import LocalStore
 
 from cache.check import Finding
@@ -11,6 +11,7 @@ from cache.entry import DATA, Manifest
 from cache.errors import DamagedEntry
 
 if TYPE_CHECKING:
+    import xarray as xr
     from zarr.abc.store import ByteRequest
     from zarr.core.buffer import Buffer, BufferPrototype
 
@@ -60,8 +61,16 @@ class EntryStore(LocalStore):
         return data
 
 
-def open_dataset(folder: Path, found: Finding) -> xr.Dataset:
+def open_group(folder: Path, found: Finding) -> zarr.Group:
+    """Return an entry's arrays as a zarr group that can only be read."""
+    store: Any = EntryStore(folder / DATA, found.manifest)
+    return zarr.open_group(store, mode="r", zarr_format=3, use_consolidated=False)
+
+
+def open_dataset(folder: Path, found: Finding) -> "xr.Dataset":
     """Return an entry's arrays as a lazy dataset, values as stored, its provenance in ``attrs``."""
+    import xarray as xr
+
     store: Any = EntryStore(folder / DATA, found.manifest)
     dataset: xr.Dataset = xr.open_zarr(store, consolidated=False, chunks={}, decode_cf=False, zarr_format=3)
     return dataset.assign_attrs(found.entry.provenance())

@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cache import publish
 from cache.check import Finding, Policy, inspect, read_record
@@ -22,6 +22,7 @@ from cache.quarantine import set_aside_if_damaged
 
 if TYPE_CHECKING:
     import xarray
+    import zarr
 
 
 @dataclass(frozen=True, init=False)
@@ -104,6 +105,17 @@ class Store:
         from cache.reader import open_dataset
 
         return open_dataset(self.layout.entry(key), found)
+
+    def arrays(self, key: str) -> "dict[str, zarr.Array[Any]]":
+        """Return the entry's arrays, checked as ``require`` does, without labels: for code that knows them.
+
+        Raises:
+            EntryNotFound, DamagedEntry, InvalidKey, CacheUnavailable: as ``require`` does.
+        """
+        found = self._require(key)
+        from cache.reader import open_group
+
+        return dict(open_group(self.layout.entry(key), found).arrays())
 
     def _require(self, key: str) -> Finding:
         """Look at an entry; move it aside if it is damaged."""

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cache import Store
 from datasets import SceneSource, open_dataset
 from pipeline.config import Config, parse_setting
@@ -16,7 +18,7 @@ from pipeline.errors import UsageError
 from pipeline.execute import execute
 from pipeline.plan import Plan, Planned, make_plan
 from pipeline.steps import Request, training_scenes
-from pipeline.tasks import Made, Unwatched, Watch, provenance
+from pipeline.tasks import Made, Unwatched, Watch, provenance, read_arrays
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -184,8 +186,7 @@ def _metric_rows(plan: Plan, store: Store, made: Mapping[str, Made]) -> Iterator
     for step_id, variant in plan.targets:
         each = made[step_id]
         if each.step.product == "metrics":
-            dataset = store.open(each.key)
-            arrays = {str(name): array.values for name, array in dataset.variables.items()}
+            arrays = read_arrays(store, each.key)
             named = {"variant": variant} if variant else {}
             yield from (row | named for row in metric_rows(each.step.scene, METHOD, each.step.R, arrays))
 
@@ -195,7 +196,10 @@ def mask_kinds(result: Result) -> dict[str, str]:
     from pipeline.sources import MASK_KINDS
 
     truths = [made for made in result.made.values() if made.step.product == "truth"]
-    return {made.step.scene: MASK_KINDS[int(result.store.open(made.key)["mask_kind"][0])] for made in truths}
+    return {
+        made.step.scene: MASK_KINDS[int(np.asarray(result.store.arrays(made.key)["mask_kind"][...])[0])]
+        for made in truths
+    }
 
 
 def sweep(

@@ -141,7 +141,8 @@ class _Planner:
 
 def _fewest(candidates: list[list[Change]]) -> tuple[Change, ...]:
     """Return the shortest list of changes; of equal ones the first, which is the newest result's."""
-    return tuple(min(candidates, key=lambda changes: len(changes))) if candidates else ()
+    shortest: list[Change] = min(candidates, key=len, default=[])
+    return tuple(shortest)
 
 
 def _own(step: Step, earlier: Recipe) -> Recipe:

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, Protocol
 
+import numpy as np
+
 from cache import Draft, Entry, Store
 from pipeline.checkpoints import Checkpoints
 from pipeline.errors import USER_ERRORS, StageFailed, StageRefused
@@ -116,7 +118,7 @@ def make_tile(context: Context, job: Job, rows: Rows) -> None:
     step = job.step
     with explained(step, str(rows)):
         inputs = {
-            product: read_block(context.store.open(keys[0]), rows, step.stage, step.argument)
+            product: read_block(context.store.arrays(keys[0]), rows, step.stage, step.argument)
             for product, keys in job.inputs.items()
         }
         made = step.stage.function()(step.argument, inputs)
@@ -199,13 +201,13 @@ def _made(step: Step, entry: Entry, reused: bool) -> Made:
 
 def _read_whole(store: Store, step: Step, product: str, keys: Sequence[str]) -> Arrays | Sequence[Arrays]:
     """Return a product's arrays; where a split step takes one a scene, a list."""
-    arrays = [_arrays(store, key) for key in keys]
+    arrays = [read_arrays(store, key) for key in keys]
     return arrays if step.takes_list(product) else arrays[0]
 
 
-def _arrays(store: Store, key: str) -> dict[str, Array]:
-    dataset = store.open(key)
-    return {str(name): array.values for name, array in dataset.variables.items()}
+def read_arrays(store: Store, key: str) -> dict[str, Array]:
+    """Return all arrays of an entry, in memory."""
+    return {name: np.asarray(array[...]) for name, array in store.arrays(key).items()}
 
 
 def _create(draft: Draft, output: Output, shape: Sequence[int], dtype: str, tile_rows: int | None) -> None:

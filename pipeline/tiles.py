@@ -9,7 +9,7 @@ import numpy as np
 from stages.stage import Array, Params, Stage
 
 if TYPE_CHECKING:
-    import xarray as xr
+    import zarr
 
 
 @dataclass(frozen=True)
@@ -29,26 +29,32 @@ def cut_rows(height: int, tile_rows: int) -> tuple[Rows, ...]:
     return tuple(Rows(start, min(start + tile_rows, height), height) for start in range(0, height, tile_rows))
 
 
-def read_block(dataset: "xr.Dataset", rows: Rows, stage: Stage, params: Params) -> dict[str, Array]:
+def read_block(arrays: "Mapping[str, zarr.Array[Any]]", rows: Rows, stage: Stage, params: Params) -> dict[str, Array]:
     """Return a product's arrays as a tile of ``stage`` needs them.
 
     Arrays with rows are cut to the tile and its halo; with ``border="edge"`` the nearest pixel stands
     for those beyond the image, on all four sides. Arrays without rows come whole.
     """
     halo = stage.halo(params)
-    block = {}
-    for name, array in dataset.variables.items():
-        if "y" in array.dims:
-            first, last = max(0, rows.start - halo), min(rows.height, rows.stop + halo)
-            values = array.isel(y=slice(first, last)).values
-            if stage.border == "edge":
-                above, below = halo - (rows.start - first), halo - (last - rows.stop)
-                margins = {"y": (above, below), "x": (halo, halo)}
-                values = np.pad(values, [margins.get(str(dim), (0, 0)) for dim in array.dims], mode="edge")
-            block[str(name)] = values
-        else:
-            block[str(name)] = array.values
-    return block
+    return {name: _read_rows(array, rows, halo, stage.border == "edge") for name, array in arrays.items()}
+
+
+def _read_rows(array: "zarr.Array[Any]", rows: Rows, halo: int, repeat_edge: bool) -> Array:
+    """Return the rows of a tile with its halo; all of an array that has no rows."""
+    dims = dims_of(array)
+    if "y" not in dims:
+        return np.asarray(array[...])
+    first, last = max(0, rows.start - halo), min(rows.height, rows.stop + halo)
+    values: Array = np.asarray(array[_index(dims, slice(first, last))])
+    if not repeat_edge:
+        return values
+    margins = {"y": (first - rows.start + halo, rows.stop + halo - last), "x": (halo, halo)}
+    return np.pad(values, [margins.get(dim, (0, 0)) for dim in dims], mode="edge")
+
+
+def dims_of(array: "zarr.Array[Any]") -> tuple[str, ...]:
+    """Return the names of an array's dimensions."""
+    return tuple(str(name) for name in getattr(array.metadata, "dimension_names", None) or ())
 
 
 def trim(arrays: Mapping[str, Array], dims: Mapping[str, tuple[str, ...]], rows: Rows, halo: int) -> dict[str, Array]:

@@ -1,0 +1,87 @@
+import numpy as np
+import pytest
+
+from stages.evaluation.confidence import confidence, padded_confidence
+from stages.evaluation.declaration import CONFIDENCE, ConfidenceParams
+from stages.evaluation.layers import evaluation_layers
+from stages.parameters import to_vector
+from stages.stage import StageError
+from tests.stages.evaluation.reference import literal_log_odds, random_layers, random_net, scene
+from tests.stages.tiling import tiled, whole
+
+DIMS = {
+    "images": {"left": ("y", "x", "band"), "moments": ("view", "moment")},
+    "disparity": {"disparity": ("y", "x")},
+    "evaluation_net": {"parameters": ("parameter",)},
+}
+
+
+def products(height: int = 21, width: int = 18) -> dict[str, dict[str, np.ndarray]]:
+    given = scene(height=height, width=width)
+    return {
+        "images": given["images"],
+        "disparity": given["disparity"],
+        "evaluation_net": {"parameters": to_vector(random_net())},
+    }
+
+
+def test_equals_the_patches_with_the_edge_repeated() -> None:
+    """Every pixel of an image smaller than a patch: each sees all four borders."""
+    net, layers = random_net(), random_layers(5, 8)
+    padded = np.pad(layers, ((0, 0), (50, 50), (50, 50)), mode="edge")
+    corners = np.argwhere(np.ones((5, 8)))
+    expected = 1 / (1 + np.exp(-literal_log_odds(net, padded, corners).reshape(5, 8)))
+    made = confidence(net, layers)
+    assert made.shape == (5, 8) and made.dtype == np.float32
+    assert np.abs(made - expected).max() <= 1e-4
+    assert np.array_equal(padded_confidence(net, padded), made)
+
+
+def test_is_a_probability_and_deterministic() -> None:
+    one, other = (confidence(random_net(), random_layers(9, 7)) for _ in range(2))
+    assert np.array_equal(one, other)
+    assert 0 <= one.min() < one.max() <= 1
+
+
+def test_a_constant_scene_is_trusted_alike_everywhere() -> None:
+    made = confidence(random_net(), np.full((2, 6, 7), 0.5, np.float32))
+    assert made.max() - made.min() <= 1e-5
+
+
+def test_bfloat16_is_close_to_float32() -> None:
+    """Probabilities within 0.05 anywhere, 0.01 on average; the outputs of this net are of size one."""
+    net, layers = random_net(), random_layers(12, 12)
+    exact, rough = confidence(net, layers), confidence(net, layers, "bfloat16")
+    assert rough.dtype == np.float32
+    assert 0 < np.abs(rough - exact).max() <= 0.05
+    assert np.abs(rough - exact).mean() <= 0.01
+
+
+@pytest.mark.parametrize("rows", [1, 8, 20])
+def test_tiles_equal_the_whole(rows: int) -> None:
+    """Up to the order of the sums in a convolution, which may depend on the size of its input."""
+    params, given = ConfidenceParams(precision="float32"), products(height=21 if rows > 1 else 4)
+    one, other = tiled(CONFIDENCE, params, given, DIMS, rows), whole(CONFIDENCE, params, given, DIMS)
+    assert one["confidence"].dtype == other["confidence"].dtype == np.float32
+    assert np.abs(one["confidence"] - other["confidence"]).max() <= 1e-5
+    assert np.ptp(other["confidence"]) > 0.01
+
+
+def test_the_stage_is_the_network_on_the_layers_of_the_left_view() -> None:
+    given = products()
+    left, moments = given["images"]["left"], given["images"]["moments"]
+    layers = evaluation_layers(left, moments[0], given["disparity"]["disparity"])
+    made = whole(CONFIDENCE, ConfidenceParams(precision="float32"), given, DIMS)
+    assert list(made) == [output.name for output in CONFIDENCE.outputs]
+    assert np.abs(made["confidence"] - confidence(random_net(), layers)).max() <= 1e-5
+
+
+def test_refuses_layers_without_an_axis_of_layers() -> None:
+    with pytest.raises(StageError, match=r"layers has shape \(5, 6\), expected 3 dimensions"):
+        confidence(random_net(), np.zeros((5, 6), np.float32))
+
+
+def test_refuses_parameters_of_another_network() -> None:
+    given = products() | {"evaluation_net": {"parameters": np.zeros(7, np.float32)}}
+    with pytest.raises(StageError, match="EvaluationNet has .* parameters, the weights hold 7"):
+        CONFIDENCE.function()(ConfidenceParams(), given)

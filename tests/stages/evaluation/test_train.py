@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+import torch
+
+from stages.evaluation.confidence import confidence
+from stages.evaluation.declaration import EVALUATION_NET, EvaluationNetParams, EvaluationSamplesParams
+from stages.evaluation.layers import evaluation_layers
+from stages.evaluation.net import EvaluationNet
+from stages.evaluation.samples import draw_samples
+from stages.evaluation.train import cut_crop, train_evaluation_net, upright_logits
+from stages.parameters import from_vector
+from tests.stages.evaluation.reference import random_net, scene
+from tests.stages.monitors import Interrupted, Memory
+
+
+def inputs(**settings: object) -> dict[str, object]:
+    given = scene()
+    params = EvaluationSamplesParams(**({"samples": 20, "rows": 2, "columns": 3} | settings))
+    samples = draw_samples(params, {name: [given[name]] for name in ("disparity", "truth")})
+    return {"images": [given["images"]], "disparity": [given["disparity"]], "evaluation_samples": samples}
+
+
+def layers() -> np.ndarray:
+    given = scene()
+    return evaluation_layers(given["images"]["left"], given["images"]["moments"][0], given["disparity"]["disparity"])
+
+
+def settings(**changes: object) -> EvaluationNetParams:
+    return EvaluationNetParams.model_validate({"steps": 4, "batch": 2, "precision": "float32"} | changes)
+
+
+@pytest.mark.parametrize("form", ["strided", "patch"])
+def test_training_sees_what_inference_sees(form: str) -> None:
+    """The answers of a training crop, at the image's border too, are the confidences of its grid's pixels."""
+    net, samples = random_net(), inputs(form=form)["evaluation_samples"]
+    dense = confidence(net, layers())
+    for index in range(4):
+        crop = cut_crop(settings(relight=0), samples, index, [layers()], np.random.default_rng(0))
+        rows, columns = samples["labels"].shape[1:]
+        assert crop.shape == (2, 101 + 16 * (rows - 1), 101 + 16 * (columns - 1))
+        logits = net(torch.from_numpy(crop)[None]).detach()[0]
+        y, x = samples["y"][index], samples["x"][index]
+        expected = dense[y :: 16, x :: 16][:rows, :columns]
+        made = torch.sigmoid(logits[1] - logits[0]).numpy()[: expected.shape[0], : expected.shape[1]]
+        assert np.abs(made - expected).max() <= 1e-4
+
+
+def test_upside_down_answers_come_in_the_upright_order() -> None:
+    """Each answer of the flipped crop is that of its own patch, flipped."""
+    net = random_net()
+    crops = np.random.default_rng(1).normal(size=(2, 2, 101 + 16, 101)).astype(np.float32)
+    made = upright_logits(net, crops, flipped=True).detach()
+    for row in (0, 1):
+        patch = torch.from_numpy(crops[:, :, 16 * row : 16 * row + 101].copy())
+        assert (made[:, :, row] - net(patch.flip(2)).detach()[:, :, 0]).abs().max() <= 1e-4
+    assert (upright_logits(net, crops, flipped=False) - net(torch.from_numpy(crops))).abs().max() <= 1e-4
+
+
+def test_light_changes_the_gray_layer_only() -> None:
+    samples = inputs()["evaluation_samples"]
+    plain, lit = (cut_crop(settings(relight=r), samples, 0, [layers()], np.random.default_rng(0)) for r in (0, 1))
+    assert not np.array_equal(plain[0], lit[0])
+    assert np.array_equal(plain[1], lit[1])
+
+
+def test_makes_what_it_declares_and_one_seed_makes_it_again() -> None:
+    given = inputs()
+    one, again, other = (train_evaluation_net(settings(steps=2, seed=seed), given) for seed in (1, 1, 2))
+    assert list(one) == [output.name for output in EVALUATION_NET.outputs]
+    for output in EVALUATION_NET.outputs:
+        assert one[output.name].dtype == output.dtype and one[output.name].ndim == 1
+        assert np.array_equal(one[output.name], again[output.name])
+        assert not np.array_equal(one[output.name], other[output.name])
+    assert len(one["loss"]) == 2
+
+
+def test_a_training_that_was_killed_ends_as_an_undisturbed_one() -> None:
+    given, params = inputs(), settings(steps=3, checkpoint_steps=1)
+    expected = train_evaluation_net(params, given)
+    memory = Memory(stop_after=3)
+    with pytest.raises(Interrupted):
+        train_evaluation_net(params, given, memory)
+    resumed = Memory(states=memory.states)
+    made = train_evaluation_net(params, given, resumed)
+    assert resumed.steps == [3]
+    for name in expected:
+        assert np.array_equal(made[name], expected[name])
+
+
+def test_it_learns_that_rough_disparities_are_wrong() -> None:
+    given = inputs(samples=40, rows=2, columns=3)
+    made = train_evaluation_net(settings(steps=25, relight=0.0), given)
+    assert made["loss"][0] == pytest.approx(np.log(2), abs=0.1), "a coin's"
+    assert made["loss"][-5:].mean() < 0.6
+    net = EvaluationNet()
+    from_vector(net, made["parameters"])
+    trusted = confidence(net, layers())
+    assert trusted[4:, :20].mean() > trusted[4:, 36:].mean() + 0.1
