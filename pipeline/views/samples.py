@@ -89,7 +89,7 @@ def _draw_crops(axes: list[Axes], seen: xr.Dataset) -> Patch:
     """Draw the truth of a few crops in one scale of disparities; return the legend's entry for what is missing."""
     shown = seen.isel(sample=slice(None, None, max(1, seen.sizes["sample"] // len(axes))))
     crops = shown["truth"].values[: len(axes)]
-    scale = disparity_scale(crops, "true disparity (px)")
+    scale = disparity_scale(crops, "truth (px)")
     for each, crop, scene in zip(axes, crops, shown["scene"].values, strict=False):
         picture = each.imshow(np.ma.masked_invalid(crop), cmap=scale.colours, vmin=scale.low, vmax=scale.high)
         each.set(title=f"crop of scene {scene}", xlabel="x (px)", ylabel="y (px)")

@@ -1,0 +1,1 @@
+"""Measured figures, each by one command; none of them is a test."""

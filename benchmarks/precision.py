@@ -1,0 +1,79 @@
+"""How far bfloat16 is from float32: raw error, changed disparities and costs, on the same rows of the same scenes.
+
+    python -m benchmarks.precision [DATASET] [--rows N] [--json FILE]
+
+The rows lie in the middle of each scene, since a CPU without bfloat16 units needs minutes for a whole one.
+"""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from datasets import SceneSource, open_dataset
+from pipeline.shipped import read_shipped_weights
+from stages.disparity import winner_take_all
+from stages.matching.cost_volume import cost_volume
+from stages.matching.net import MatchingNet, net_from_parameters
+from stages.metrics import raw_bad
+from stages.precision import Precision, fast_bfloat16
+from stages.transforms.channels import channels
+
+MARGIN = 5
+"""Rows of context above and below, so that the rows measured are those of the whole image."""
+
+
+def measure(scene: SceneSource, net: MatchingNet, rows: int) -> dict[str, Any]:
+    """Return raw error (> 1 px, nonocc, %) in both precisions, changed disparities and the cost difference."""
+    loaded = scene.load()
+    if loaded.truth is None:
+        raise typer.BadParameter(f"{scene.name} has no ground truth")
+    first = max(MARGIN, (scene.size[0] - rows) // 2)
+    block = channels(loaded.left, loaded.right)[:, :, first - MARGIN : first + rows + MARGIN]
+    truth, mask = (array[first : first + rows] for array in (loaded.truth.disparity, loaded.truth.nonocc))
+    disparities = range(scene.disparities.minimum, scene.disparities.maximum + 1)
+    costs = {precision: _costs(net, block, disparities, precision) for precision in ("float32", "bfloat16")}
+    maps = {precision: winner_take_all(cost, disparities.start) for precision, cost in costs.items()}
+    changed = np.abs(maps["bfloat16"] - maps["float32"])[mask]
+    return {
+        "scene": scene.name,
+        "pixels": int(mask.sum()),
+        **{f"raw_bad_{precision}": raw_bad(made, truth, mask, 1.0) for precision, made in maps.items()},
+        "changed_percent": 100 * float((changed > 0).mean()),
+        "changed_over_1px_percent": 100 * float((changed > 1).mean()),
+        "largest_cost_difference": float(np.nanmax(np.abs(costs["bfloat16"] - costs["float32"]))),
+    }
+
+
+def _costs(
+    net: MatchingNet, block: NDArray[np.float32], disparities: range, precision: Precision
+) -> NDArray[np.float32]:
+    return cost_volume(net, block, disparities, precision)[MARGIN:-MARGIN]
+
+
+def main(
+    dataset: str = "motorcycle",
+    rows: Annotated[int, typer.Option(help="rows of each scene")] = 8,
+    out: Annotated[Path | None, typer.Option("--json", help="write the figures here")] = None,
+) -> None:
+    """Measure, print a table and write JSON."""
+    net = net_from_parameters(read_shipped_weights("matching_net", {})["parameters"], 3)
+    found = [measure(scene, net, rows) for scene in open_dataset(dataset).scenes if scene.has_truth]
+    mean = {name: float(np.mean([row[name] for row in found])) for name in found[0] if name != "scene"}
+    table = Table("scene", *mean, box=None)
+    for row in [*found, {"scene": "mean"} | mean]:
+        table.add_row(row["scene"], *(f"{row[name]:.4g}" for name in mean))
+    Console(width=160).print(table)
+    if out:
+        out.write_text(
+            json.dumps({"name": "precision", "figures": mean, "scenes": found, "fast_bfloat16": fast_bfloat16()})
+        )
+
+
+if __name__ == "__main__":
+    typer.run(main)
