@@ -280,8 +280,9 @@ def explain(task: Task, product: str, scene: str | None = None) -> Planned:
     """
     plan = status(task, product)
     targets = dict(plan.targets)
-    for planned in plan.steps:
-        step = planned.step
-        if step.id in targets and scene in (None, step.scene, step.scene.rsplit("/", 1)[-1]):
-            return planned
-    raise UsageError(f"{product}: no scene {scene!r} in {task.dataset}")
+    asked = [planned for planned in plan.steps if planned.step.id in targets and planned.step.product == product]
+    found = [each for each in asked if scene in (None, each.step.scene, each.step.scene.rsplit("/", 1)[-1])]
+    if len(found) != 1:
+        names = ", ".join(each.step.scene for each in asked) or "none"
+        raise UsageError(f"{product} of {scene or task.dataset}: {len(found)} scenes fit ({names}); name one")
+    return found[0]

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
@@ -24,7 +25,7 @@ def list_entries(folder: Path | None, as_json: bool) -> None:
         return
     table = Table("product", "dataset", "scene", "size", "age", "made in", "key", box=None)
     for entry in entries:
-        label = [entry.label.get(name, "") for name in ("product", "dataset", "scene")]
+        label = [escape(entry.label.get(name, "")) for name in ("product", "dataset", "scene")]
         table.add_row(*label, bytes_text(entry.size), _age(entry.created), f"{entry.seconds:.2f} s", entry.key[:12])
     results().print(table)
 
@@ -43,9 +44,12 @@ def verify_entries(folder: Path | None, as_json: bool) -> bool:
         return sound
     console = results()
     for key, reason in report.damaged.items():
-        console.print(f"damaged {key[:12]}: {reason}; it will be moved to quarantine and made again when it is needed")
+        console.print(
+            f"damaged {key[:12]}: {reason}; it will be moved to quarantine and made again when it is needed",
+            markup=False,
+        )
     for name, reason in report.quarantined.items():
-        console.print(f"in quarantine {name}: {reason}", style="dim")
+        console.print(f"in quarantine {name}: {reason}", style="dim", markup=False)
     console.print(f"{len(report.sound)} sound, {len(report.damaged)} damaged, {len(report.quarantined)} in quarantine")
     return sound
 
@@ -59,7 +63,7 @@ def print_sizes(folder: Path | None, as_json: bool) -> None:
         print_json({"cache": str(store.root), "products": dict(sizes.stages), **parts})
         return
     console = results()
-    console.print(f"{store.root}", style="bold")
+    console.print(f"{store.root}", style="bold", markup=False)
     console.print(_sizes_table(sizes.stages, parts))
 
 
@@ -75,7 +79,7 @@ def bytes_text(count: int) -> str:
     """Return a number of bytes for people: ``47.7 MB``."""
     value = float(count)
     for unit in ("B", "kB", "MB"):
-        if value < 1000:
+        if value < 999.5:  # what rounds to 1000 is one of the next unit
             return f"{value:.3g} {unit}"
         value /= 1000
     return f"{value:.4g} GB"

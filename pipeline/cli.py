@@ -262,21 +262,22 @@ def _export(result: "Result", output: Path | None) -> list[Path]:
     return export(result, output)
 
 
-class _Terminated(BaseException):
-    """SIGTERM arrived."""
+class _Stopped(BaseException):
+    """SIGINT or SIGTERM arrived. Not KeyboardInterrupt: typer would wait for the tasks that still compute."""
 
 
-def _terminate(*_: Any) -> None:  # noqa: ANN401
-    raise _Terminated
+def _stop(number: int, _: Any) -> None:  # noqa: ANN401
+    raise _Stopped(number)
 
 
 def main() -> None:
     """Run the command line; a user's mistake is one line and exit code 2."""
-    signal.signal(signal.SIGTERM, _terminate)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _stop)
     try:
         app()
-    except (KeyboardInterrupt, _Terminated) as stop:
-        _leave(130 if isinstance(stop, KeyboardInterrupt) else 143)
+    except _Stopped as stop:
+        _leave(128 + int(stop.args[0]))
     except Exception as error:
         from pipeline.errors import USER_ERRORS
 

@@ -64,7 +64,7 @@ class Config(BaseModel):
         try:
             return cls.model_validate(tree)
         except ValidationError as error:
-            raise UsageError(_explain(error)) from None
+            raise UsageError(one_line(error)) from None
 
 
 def _read_toml(file: Path) -> dict[str, Any]:
@@ -126,8 +126,8 @@ def nearest(name: str, known: Iterable[str], prefix: str = "") -> str:
     return f"there are {', '.join(prefix + item for item in names)}" if names else "it has no settings"
 
 
-def _explain(error: ValidationError) -> str:
-    """Return one line for the first thing that is wrong."""
+def one_line(error: ValidationError) -> str:
+    """Return one line for the first thing that is wrong with a configuration."""
     first = error.errors(include_url=False)[0]
     name = ".".join(str(part) for part in first["loc"])
     more = f" ({error.error_count() - 1} more)" if error.error_count() > 1 else ""

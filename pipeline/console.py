@@ -5,11 +5,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from cache import Change
 from pipeline.execute import totals
-from pipeline.plan import Plan, Planned
+from pipeline.plan import PENDING, Plan, Planned
 from pipeline.tasks import Made
 
 STYLES = {"hit": "green", "made": "cyan", "stale": "yellow", "missing": "dim"}
@@ -53,7 +54,8 @@ def print_plan(plan: Plan) -> None:
     table = Table("product", "scene", "state", "key", "why", box=None, pad_edge=False)
     for planned in plan.steps:
         state = f"[{STYLES[planned.state]}]{planned.state}[/]"
-        table.add_row(planned.step.product, planned.step.scene, state, (planned.key or "")[:12], why(planned))
+        scene, reason = escape(planned.step.scene), escape(why(planned))
+        table.add_row(planned.step.product, scene, state, (planned.key or "")[:12], reason)
     console = results()
     console.print(table)
     print_notes(plan.notes)
@@ -71,10 +73,12 @@ def why(planned: Planned) -> str:
         return f"damaged: {planned.damage}"
     if planned.state == "missing":
         return "never made" if planned.key else "never made; its inputs are not there yet"
-    return "; ".join(str(change) for change in _telling(planned.changed))
+    above = [change.field.removeprefix("inputs.") for change in planned.changed if change.new == PENDING]
+    own = [str(change) for change in planned.changed if change.new != PENDING]
+    return "; ".join([*_telling(own), *([f"made after {', '.join(above)}"] if above else [])])
 
 
-def _telling(changes: Sequence[Change], most: int = 3) -> Iterable[object]:
+def _telling(changes: Sequence[str], most: int = 3) -> Iterable[str]:
     """Return the first changes, and how many more there are."""
     yield from changes[:most]
     if len(changes) > most:
@@ -85,7 +89,7 @@ def print_notes(notes: Sequence[str]) -> None:
     """Print what a person should know; many of a kind in one line."""
     console = Console(stderr=True, soft_wrap=True)
     for note in notes[:5]:
-        console.print(f"note: {note}", highlight=False, style="dim")
+        console.print(f"note: {note}", highlight=False, style="dim", markup=False)
     if len(notes) > 5:
         console.print(f"note: and {len(notes) - 5} more like these", style="dim", highlight=False)
 
@@ -160,4 +164,4 @@ def _cells(row: Mapping[str, Any]) -> list[str]:
     digits = {"auc": 4, "auc_optimal": 4, "avgerr": 2, "rms": 2}
     figures = [f"{row[name]:.{digits.get(name, 1)}f}" if name in row else "-" for name in FIGURES]
     threshold = f"{row['R']:g}" if "R" in row else "-"
-    return [row["scene"], f"{row['threshold_px']:g}", threshold, *figures, str(row["pixels"])]
+    return [escape(row["scene"]), f"{row['threshold_px']:g}", threshold, *figures, str(row["pixels"])]

@@ -1,5 +1,6 @@
 """List the datasets that can be named, and the scenes of one."""
 
+from rich.markup import escape
 from rich.table import Table
 
 from datasets import describe, open_dataset
@@ -43,5 +44,5 @@ def list_scenes(dataset: str, as_json: bool) -> None:
     table = Table("scene", "rows x columns", "disparities px", "split", "truth", box=None)
     for scene in scenes:
         size, bounds = f"{scene.size[0]} x {scene.size[1]}", f"{scene.disparities.minimum}..{scene.disparities.maximum}"
-        table.add_row(scene.name, size, bounds, scene.split, "yes" if scene.has_truth else "no")
+        table.add_row(escape(scene.name), size, bounds, scene.split, "yes" if scene.has_truth else "no")
     results().print(table)

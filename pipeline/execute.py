@@ -52,7 +52,7 @@ def _on_threads(plan: Plan, store: Store, watch: Watch, extras: Mapping[str, Any
     import dask
 
     drafts = _Drafts(watch)
-    results = _graph(plan, Context(store, drafts, extras))
+    results, _ = _graph(plan, Context(store, drafts, extras))
     pool = ThreadPoolExecutor(workers)
     try:
         made: Sequence[Made] = dask.compute(*results, scheduler="threads", pool=pool)
@@ -73,31 +73,49 @@ def _on_cluster(plan: Plan, context: Context, watch: Watch, address: str) -> dic
         client = Client(address, timeout="10s")
     except (OSError, ValueError) as error:
         raise UsageError(f"no Dask scheduler answers at {address}: {error}") from None
+    results, jobs = _graph(plan, context)
     with client:
-        futures = client.compute(_graph(plan, context))
+        futures = client.compute([*results, *jobs])
+        begun = futures[len(results) :]
         made = {}
-        for future in as_completed(futures):
-            each: Made = future.result()
-            made[each.step.id] = each
-            if not each.reused:
-                watch.published(each)
+        try:
+            for future in as_completed(futures[: len(results)]):
+                each: Made = future.result()
+                made[each.step.id] = each
+                if not each.reused:
+                    watch.published(each)
+        except BaseException:
+            _abandon(client, begun)
+            raise
     return {planned.step.id: made[planned.step.id] for planned in plan.steps}
 
 
-def _graph(plan: Plan, context: Context) -> list[Any]:
-    """Return one delayed ``Made`` a step."""
+def _abandon(client: Any, begun: Iterable[Any]) -> None:  # noqa: ANN401 - Dask's types carry no annotations
+    """Delete the drafts of a run that ends early: the workers, who own them, may live on for long."""
+    drafts = [future.result().draft for future in begun if future.status == "finished"]
+    client.cancel(list(begun))
+    for draft in drafts:
+        if draft is not None:
+            draft.discard()
+
+
+def _graph(plan: Plan, context: Context) -> tuple[list[Any], list[Any]]:
+    """Return one delayed ``Made`` a step, and one delayed ``Job`` a step that is not a hit."""
     from dask import delayed
 
     results: dict[str, Any] = {}
+    jobs = []
     for planned in plan.steps:
         if planned.state == "hit":
             results[planned.step.id] = delayed(_there(planned), traverse=False)
         else:
-            results[planned.step.id] = _delayed_step(planned.step, plan, context, results)
-    return list(results.values())
+            results[planned.step.id], job = _delayed_step(planned.step, plan, context, results)
+            jobs.append(job)
+    return list(results.values()), jobs
 
 
-def _delayed_step(step: Step, plan: Plan, context: Context, results: Mapping[str, Any]) -> Any:  # noqa: ANN401
+def _delayed_step(step: Step, plan: Plan, context: Context, results: Mapping[str, Any]) -> tuple[Any, Any]:
+    """Return a step's delayed ``Made``, and the delayed ``Job`` that it starts with."""
     from dask import delayed
 
     def task(function: Any, *arguments: Any) -> Any:  # noqa: ANN401
@@ -113,7 +131,7 @@ def _delayed_step(step: Step, plan: Plan, context: Context, results: Mapping[str
         ready = task(tasks.create_arrays, job)
         rows = cut_rows(step.size[0], step.stage.tile_rows)
         parts = [task(tasks.make_tile, shared, ready, delayed(each, traverse=False)) for each in rows]
-    return task(tasks.publish, shared, job, parts)
+    return task(tasks.publish, shared, job, parts), job
 
 
 class _Drafts:

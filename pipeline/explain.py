@@ -46,13 +46,13 @@ def _of_entry(entry: Entry) -> dict[str, Any]:
 def print_explanation(found: Mapping[str, Any]) -> None:
     """Print the ingredients, a line each; code as module and the first digits of its hash."""
     console = Console(highlight=False, soft_wrap=True)
-    console.print(f"{found['product']} of {found['scene']}: {found['state']}", style="bold")
+    console.print(f"{found['product']} of {found['scene']}: {found['state']}", style="bold", markup=False)
     console.print(f"key     {found['key'] or 'open until its inputs are made'}")
     if "digest" in found:
         made = f"made {found['created']} in {found['seconds']:.2f} s, {found['bytes']:,} bytes"
         console.print(f"digest  {found['digest']}\n{made}")
     for change in found["changed"]:
-        console.print(f"changed {change['field']}: {change['old']} -> {change['new']}", style="yellow")
+        console.print(f"changed {change['field']}: {change['old']} -> {change['new']}", style="yellow", markup=False)
     for part in ("params", "inputs", "environment", "code"):
         console.print(f"\n{part}", style="bold")
         for name, value in found["recipe"][part].items():

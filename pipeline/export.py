@@ -22,6 +22,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import numpy as np
@@ -42,7 +43,7 @@ COLUMNS = ("scene", "method", "mask", "threshold_px", "R", "pixels", *ROW)
 _MAPS = ("disparity", "confidence", "semidense")
 _LAST = 50
 """Training steps that the final loss is a mean of."""
-Span = tuple[float, float]
+_Span = tuple[float, float]
 
 
 def export(result: Result, folder: Path) -> list[Path]:
@@ -60,7 +61,9 @@ def export(result: Result, folder: Path) -> list[Path]:
         UsageError: if the folder is a file, or cannot be written.
         CacheError: if a result is no longer in the cache.
     """
-    exporter = _Exporter(result, Path(folder))
+    folder = Path(folder)
+    writable_folder(folder)
+    exporter = _Exporter(result, folder)
     exporter.write_networks()
     exporter.write_maps()
     exporter.write_metrics()
@@ -75,7 +78,7 @@ class _Exporter:
     result: Result
     folder: Path
     written: list[Path] = field(default_factory=list)
-    _spans: dict[str, Span] = field(default_factory=dict)
+    _spans: dict[str, _Span] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Find what there is, and name the scenes' folders."""
@@ -98,16 +101,17 @@ class _Exporter:
                 self._write_map(each)
 
     def _write_map(self, each: Wanted) -> None:
-        path = self._place(self.folder / self.scenes[each.made.step.scene] / each.stem)
+        folder = self.folder / self.scenes[each.made.step.scene]
+        writable_folder(folder)
         values = self._read(each.made, "confidence" if each.product == "confidence" else "disparity")
-        pfm, png = (path.with_name(f"{path.name}.{suffix}") for suffix in ("pfm", "png"))
+        pfm, png = (folder / f"{each.stem}.{suffix}" for suffix in ("pfm", "png"))
         with explaining(pfm):
             write_pfm(pfm, values)
         colours = confidence_rgb(values) if each.product == "confidence" else disparity_rgb(values, *self._span(each))
         write_rgb(colours, png)
         self.written += [pfm, png]
 
-    def _span(self, each: Wanted) -> Span:
+    def _span(self, each: Wanted) -> _Span:
         """Return the span of colours: that of the raw map, so that raw and filtered pictures compare."""
         raw = next(step for step in lineage(self.result.made, each.made.step.id) if step.product == "disparity")
         if raw.id not in self._spans:
@@ -120,7 +124,9 @@ class _Exporter:
     def write_metrics(self) -> None:
         """Write the rows of the figures, if the run went so far."""
         if self.result.metrics:
-            self._write(self.folder / "metrics.csv", metrics_csv(self.result.metrics).encode())
+            path = self.folder / "metrics.csv"
+            write_rows(self.result.metrics, path)
+            self.written.append(path)
 
     def write_config(self) -> None:
         """Write the command, the versions, and the settings that each result was made with."""
@@ -142,15 +148,9 @@ class _Exporter:
         }
 
     def _write(self, path: Path, data: bytes) -> None:
-        with explaining(path), atomic_write(self._place(path)) as file:
+        with explaining(path), atomic_write(path) as file:
             file.write(data)
         self.written.append(path)
-
-    def _place(self, path: Path) -> Path:
-        """Make the folder of a file."""
-        with explaining(path.parent):
-            path.parent.mkdir(parents=True, exist_ok=True)
-        return path
 
 
 def _weights(result: Result, made: Made, parameters: Any, loss: Any) -> bytes:  # noqa: ANN401
@@ -170,15 +170,31 @@ def _weights(result: Result, made: Made, parameters: Any, loss: Any) -> bytes:  
     return save_weights(made.step.product, parameters, metadata)
 
 
-def metrics_csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return metrics rows as CSV with the columns ``COLUMNS``; what does not apply is empty.
+def writable_folder(folder: Path) -> None:
+    """Make a folder if it is missing.
+
+    Raises:
+        UsageError: if it is a file, or cannot be made or written to.
+    """
+    with explaining(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):  # permissions alone do not tell: the file system may be read-only
+            pass
+
+
+def write_rows(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Write metrics rows as CSV with the columns ``COLUMNS``; what does not apply is empty.
 
     A last column ``variant`` is added only where rows of a sweep cannot be told apart without it.
+
+    Raises:
+        UsageError: if the file cannot be written.
     """
-    named = [tuple(row.get(name) for name in COLUMNS[:5]) for row in rows]
-    columns = COLUMNS if len(set(named)) == len(named) else (*COLUMNS, "variant")
+    named = {tuple(row.get(name) for name in COLUMNS[:5]) for row in rows}
+    columns = COLUMNS if len(named) == len(rows) else (*COLUMNS, "variant")
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    return text.getvalue()
+    with explaining(path), atomic_write(path) as file:
+        file.write(text.getvalue().encode())

@@ -107,7 +107,7 @@ def print_inspection(found: Inspection, png: Path | None, as_json: bool) -> None
         table.add_row(row["name"], row["dims"], row["dtype"], *figures, none, row["units"])
     console.print(table)
     if png:
-        console.print(f"wrote {png}")
+        console.print(f"wrote {png}", markup=False)
     console.print(
         "in Python: from pipeline.api import open_product, open_store; "
         f'open_product(open_store("{found.store.root}"), "{found.planned.key}")',

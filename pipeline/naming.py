@@ -12,7 +12,7 @@ _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 
 def safe_names(names: Iterable[str]) -> dict[str, str]:
-    """Return a file name for each name: no separator, no leading dot, different ones for different names.
+    """Return a file name for each name: no separator, no dot or dash first, different ones for different names.
 
     Letters, digits and ``._=+-`` stay, every run of anything else becomes ``_``. Names that would come out alike, on
     a file system without upper and lower case too, have the start of their sha256 appended.
@@ -26,7 +26,7 @@ def safe_names(names: Iterable[str]) -> dict[str, str]:
 
 
 def _plain(name: str) -> str:
-    safe = _UNUSUAL.sub("_", name).lstrip(".").rstrip(".")[:_LONGEST].rstrip(".")
+    safe = _UNUSUAL.sub("_", name).lstrip(".-").rstrip(".")[:_LONGEST].rstrip(".")
     return f"_{safe}" if not safe or _RESERVED.fullmatch(safe) else safe
 
 

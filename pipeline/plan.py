@@ -16,7 +16,8 @@ from pipeline.errors import UsageError
 from pipeline.steps import PRODUCTS, Request, Step, build
 
 State = Literal["hit", "made", "stale", "missing"]
-_PENDING = "to be made again"
+PENDING = "to be made again"
+"""Stands in a ``Change`` for the digest of an input that is to be made before the step."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ class _Planner:
 
     def _pending(self, step: Step, open_inputs: Mapping[str, tuple[str, ...]]) -> tuple[Change, ...]:
         """Return the step's own changes, and the inputs that are to be made before it."""
-        pending = tuple(Change(f"inputs.{product}", ABSENT, _PENDING) for product in open_inputs)
+        pending = tuple(Change(f"inputs.{product}", ABSENT, PENDING) for product in open_inputs)
         own: list[list[Change]] = [
             [change for change in differences(entry.recipe, _own(step, entry.recipe)) if change.field != "inputs"]
             for entry in self._earlier(step)

@@ -77,7 +77,7 @@ class ProgressWatch:
             row.said = now
             left = (now - row.started) / row.done * (total - row.done)
             text = f"{step.name}: {row.done} of {total}, about {left:.0f} s left {note}"
-            self._console.print(text.rstrip(), highlight=False, soft_wrap=True)
+            self._console.print(text.rstrip(), highlight=False, soft_wrap=True, markup=False)
 
     def published(self, made: Made) -> None:
         """Turn the bar into a line, if the product took long enough to be worth one."""
@@ -86,7 +86,9 @@ class ProgressWatch:
             if row is not None:
                 self._bars.remove_task(row.task)  # type: ignore[arg-type]
             if not made.reused and made.seconds >= 1.0:
-                self._console.print(f"made {made.step.name} in {made.seconds:.1f} s", highlight=False, soft_wrap=True)
+                self._console.print(
+                    f"made {made.step.name} in {made.seconds:.1f} s", highlight=False, soft_wrap=True, markup=False
+                )
 
 
 class _Row:

@@ -11,10 +11,12 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
 
+from pydantic import ValidationError
+
 from cache import Recipe, code_parts
 from datasets import Dataset, SceneSource
 from pipeline import shipped, sources
-from pipeline.config import Config, nearest
+from pipeline.config import Config, nearest, one_line
 from pipeline.errors import UsageError
 from stages.catalog import STAGES
 from stages.precision import resolve
@@ -245,13 +247,27 @@ class _Builder:
 def _resolved(params: Params, scene: SceneSource | None) -> Params:
     """Return the settings with what was left open filled in: the scene's range, this CPU's precision."""
     update: dict[str, Any] = {}
+    if scene:
+        _require_within(params, scene)
     if hasattr(params, "precision"):
         update["precision"] = resolve(params.precision)
     if scene and getattr(params, "d_min", 0) is None:
         update["d_min"] = scene.disparities.minimum
     if scene and getattr(params, "d_max", 0) is None:
         update["d_max"] = scene.disparities.maximum
-    return type(params).model_validate(dict(params) | update)
+    try:
+        return type(params).model_validate(dict(params) | update)
+    except ValidationError as error:
+        raise UsageError(f"{scene.name if scene else SPLIT}: {one_line(error)}") from None
+
+
+def _require_within(params: Params, scene: SceneSource) -> None:
+    """Refuse a range that no pixel of the image can have: it would only fill memory and disk."""
+    width = scene.size[1]
+    for name in ("d_min", "d_max"):
+        value = getattr(params, name, None)
+        if value is not None and abs(value) >= width:
+            raise UsageError(f"{scene.name}: {name} is {value} px, but the image is only {width} px wide")
 
 
 def _tiles(stage: Stage, params: Params) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ _MARGINS = (1.5, 0.95)
 _HEAD = 0.75
 """Height of the figure's title and legend, inches."""
 _DPI = 150
+_TITLE = 72
+"""Characters of a line of the title: what fits above a single map."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ def disparity_scale(disparity: NDArray[Any], label: str = "disparity (px)") -> S
 def new_figure(title: str) -> Figure:
     """Return an empty figure under a title, which is taken literally: a scene's name is no formula."""
     figure = Figure(dpi=_DPI, layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.1))
-    figure.suptitle(title, fontsize="large", fontweight="bold", parse_math=False, wrap=True)
+    figure.suptitle(fill(title, _TITLE), fontsize="large", fontweight="bold", parse_math=False)
     return figure
 
 

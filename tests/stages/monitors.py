@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 
-class Interrupted(Exception):
+class InterruptedTrainingError(Exception):
     """The work was stopped from outside."""
 
 
@@ -22,7 +22,7 @@ class Memory:
         self.totals.add(total)
         self.notes.append(note)
         if done == self.stop_after:
-            raise Interrupted
+            raise InterruptedTrainingError
 
     def save(self, state: bytes) -> None:
         self.states.append(state)

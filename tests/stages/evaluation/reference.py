@@ -53,10 +53,10 @@ def random_layers(height: int, width: int, seed: int = 0) -> np.ndarray:
 def scene(seed: int = 0, height: int = 40, width: int = 56) -> dict[str, dict[str, np.ndarray]]:
     """Return a scene whose disparities are right on the left half and wrong by 3 px, and rough, on the right."""
     rng = np.random.default_rng(seed)
-    truth = np.full((height, width), 20, np.float32)
+    truth = np.full((height, width), 3, np.float32)
     disparity = truth + rng.uniform(-0.5, 0.5, truth.shape).astype(np.float32)
     disparity[:, width // 2 :] += 3 * rng.choice(np.float32([-1, 1]), (height, width - width // 2))
-    truth[:2], disparity[5, 3] = np.nan, np.nan
+    truth[:2], disparity[3, 3] = np.nan, np.nan
     left = rng.integers(0, 256, (height, width, 1)).astype(np.uint8)
     return {
         "images": {"left": left, "moments": np.array([[127.0, 74.0], [127.0, 74.0]])},

@@ -116,9 +116,9 @@ def test_interleave_by_hand() -> None:
     """Each of the 16 x 16 pixels of a cell is told which fragment it came from."""
     made = interleave(torch.arange(256.0).reshape(256, 1, 1))
     assert made.shape == (16, 16)
-    assert made[0, :5].tolist() == [0, 64, 16, 80, 4], "x offsets 1, 2, 1 + 2, 4: the first pooling's weighs least"
-    assert made[:5, 0].tolist() == [0, 128, 32, 160, 8], "y offsets likewise"
-    assert made[8, 8] == 3 and made[15, 15] == 255
+    assert made[0, :5].tolist() == [0, 1, 4, 5, 16], "x offsets 1, 2, 1 + 2, 4: bits 0, 2, 4"
+    assert made[:5, 0].tolist() == [0, 2, 8, 10, 32], "y offsets: bits 1, 3, 5"
+    assert made[8, 8] == 128 + 64 and made[15, 15] == 255
     assert sorted(made.flatten().tolist()) == list(range(256))
 
 

@@ -83,7 +83,9 @@ def test_a_vector_of_parameters_tells_its_head(channels: int, head: Head) -> Non
 
 
 def test_refuses_parameters_of_other_channels() -> None:
-    with pytest.raises(StageError, match=r"parameters do not fit 3 channel\(s\) a view: it was trained on other") as error:
+    with pytest.raises(
+        StageError, match=r"parameters do not fit 3 channel\(s\) a view: it was trained on other"
+    ) as error:
         net_from_parameters(to_vector(random_net(2)), 3)
     assert "\n" not in str(error.value)
 

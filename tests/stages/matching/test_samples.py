@@ -174,10 +174,16 @@ def narrow_range() -> dict[str, dict]:
 @pytest.mark.parametrize(
     ("params", "scene", "message"),
     [
-        pytest.param({"height": 31}, shifted_scene(), r"crop of \(31, 40\) px does not fit .* \(30, 64\) px", id="tall"),
+        pytest.param(
+            {"height": 31}, shifted_scene(), r"crop of \(31, 40\) px does not fit .* \(30, 64\) px", id="tall"
+        ),
         pytest.param({"width": 65}, shifted_scene(), r"crop of \(24, 65\) px does not fit", id="wide"),
-        pytest.param({"mirror": False}, blind_scene(), "no pixel with a known disparity that both views see", id="blind"),
-        pytest.param({"form": "patch", "mirror": False}, narrow_range(), r"range 8\.\.10 px has no mismatch", id="range"),
+        pytest.param(
+            {"mirror": False}, blind_scene(), "no pixel with a known disparity that both views see", id="blind"
+        ),
+        pytest.param(
+            {"form": "patch", "mirror": False}, narrow_range(), r"range 8\.\.10 px has no mismatch", id="range"
+        ),
     ],
 )
 def test_refuses(params: dict[str, object], scene: dict[str, dict], message: str) -> None:

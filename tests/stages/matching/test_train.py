@@ -8,7 +8,7 @@ from stages.matching.net import net_from_parameters
 from stages.matching.samples import draw_samples
 from stages.matching.train import IGNORED, Crop, balanced_loss, cut_crop, label_cells, train_matching_net
 from tests.stages.matching.reference import literal_logits, patches, random_net, shifted_scene
-from tests.stages.monitors import Interrupted, Memory
+from tests.stages.monitors import InterruptedTrainingError, Memory
 
 N = np.nan
 TINY = {"samples": 24, "height": 5, "width": 8, "slots": 3}
@@ -57,12 +57,13 @@ def test_the_loss_is_that_of_the_patches() -> None:
     scene, net = shifted_scene(height=14, width=30), random_net()
     given = inputs(scene, samples=6, mirror=False)
     left, right = (patches(view) for view in scene["channels"]["channels"])
-    samples, means = given["matching_samples"], []
-    logits, labels = [], []
+    samples, logits, labels = given["matching_samples"], [], []
     for index, crop in enumerate(crops(given, 6)):
         for slot, row, column in np.argwhere(crop.labels.numpy() != IGNORED):
             y, x = samples["y"][index] + row, samples["x"][index] + column
-            logits.append(literal_logits(net, left[y, x][None], right[y, x - samples["disparities"][index][slot]][None]))
+            logits.append(
+                literal_logits(net, left[y, x][None], right[y, x - samples["disparities"][index][slot]][None])
+            )
             labels.append(int(crop.labels[slot, row, column]))
     losses = torch.nn.functional.cross_entropy(torch.cat(logits), torch.tensor(labels), reduction="none").numpy()
     means = [losses[np.array(labels) == label].mean() for label in (0, 1)]
@@ -148,7 +149,9 @@ def test_the_first_loss_is_that_of_a_coin() -> None:
 
 def test_the_net_knows_the_scales_of_the_training_channels() -> None:
     scene = shifted_scene()
-    scene["channels"]["channels"] = scene["channels"]["channels"] * np.float32([3, 0, 0.5])[:, None, None] + np.float32(7)
+    scene["channels"]["channels"] = scene["channels"]["channels"] * np.float32([3, 0, 0.5])[:, None, None] + np.float32(
+        7
+    )
     made = train_matching_net(settings(steps=1), inputs(scene))["parameters"]
     net = net_from_parameters(made, 3)
     views = scene["channels"]["channels"]
@@ -160,7 +163,7 @@ def test_a_training_that_was_killed_ends_as_an_undisturbed_one() -> None:
     given, params = inputs(), settings(steps=5, checkpoint_steps=2)
     expected = train_matching_net(params, given)
     memory = Memory(stop_after=3)
-    with pytest.raises(Interrupted):
+    with pytest.raises(InterruptedTrainingError):
         train_matching_net(params, given, memory)
     resumed = Memory(states=memory.states)
     made = train_matching_net(params, given, resumed)
@@ -171,10 +174,12 @@ def test_a_training_that_was_killed_ends_as_an_undisturbed_one() -> None:
 
 def test_it_learns_to_match_a_random_texture() -> None:
     scene = shifted_scene(height=20, width=48)
-    given = inputs(scene, samples=64, height=10, width=16, slots=4)
-    made = train_matching_net(settings(steps=40, batch=4, relight=0.0), given)
-    assert made["loss"][-5:].mean() < 0.6 * made["loss"][:3].mean()
-    costs = cost_volume(net_from_parameters(made["parameters"], 3), scene["channels"]["channels"], range(0, 12))
+    views = scene["channels"]["channels"][:, :1]
+    scene["channels"]["channels"] = views
+    given = inputs(scene, samples=64, height=8, width=12, slots=4)
+    made = train_matching_net(settings(steps=20, relight=0.0), given)
+    assert made["loss"][-5:].mean() < 0.7 * made["loss"][:3].mean()
+    costs = cost_volume(net_from_parameters(made["parameters"], 1), views, range(12))
     inside = np.s_[2:18, 14:40]
     right = np.nanargmin(costs[inside], 2) == scene["truth"]["disparity"][inside]
     assert right.mean() > 0.6, "chance is 0.08"

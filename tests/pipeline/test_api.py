@@ -1,0 +1,192 @@
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline import api
+from pipeline.api import Result, Task, open_product, open_store, parse_thresholds
+from pipeline.errors import UsageError
+
+MakePair = Callable[[Path], Path]
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        pytest.param("0.05:0.95:0.05", [round(0.05 * n, 2) for n in range(1, 20)], id="the last is included"),
+        pytest.param("0.1:0.35:0.1", [0.1, 0.2, 0.3], id="the last is not hit"),
+        pytest.param("0:1:0.5", [0, 0.5, 1], id="both ends"),
+        pytest.param("0.5:0.5:1", [0.5], id="first is last"),
+        pytest.param("0.9", [0.9], id="one"),
+        pytest.param("0.9,0.1", [0.9, 0.1], id="as they come"),
+        pytest.param([0.2, 0.4], [0.2, 0.4], id="a sequence"),
+    ],
+)
+def test_thresholds_are_read(text: str, values: list[float]) -> None:
+    assert parse_thresholds(text) == values
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "a",
+        "0.1:0.2",
+        "0.1:0.2:0.3:0.4",
+        "0.5:0.1:0.1",
+        "0:1:0",
+        "0:1:-0.1",
+        "0:1:1e-9",
+        "nan",
+        "0.1,",
+        "1.5",
+        "-0.1",
+        "0:2:0.5",
+        "0:inf:0.1",
+        "nan:1:0.1",
+        [],
+    ],
+)
+def test_other_thresholds_are_refused_in_one_line(text: str) -> None:
+    with pytest.raises(UsageError, match=r"^R = ") as caught:
+        parse_thresholds(text)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_cache_is_where_one_says_then_where_the_environment_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PIPELINE_CACHE", str(tmp_path / "environment"))
+    assert open_store(tmp_path / "said").root == tmp_path / "said"
+    assert open_store().root == tmp_path / "environment"
+    monkeypatch.delenv("PIPELINE_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
+    assert open_store().root.name == "semidense-stereo"
+    assert list(tmp_path.iterdir()) == [], "asking makes nothing"
+
+
+def test_a_home_is_expanded(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert open_store("~/c").root == tmp_path / "c"
+
+
+def test_a_result_is_found_by_product_and_scene(trained: Result) -> None:
+    assert trained.find("metrics").step.scene == "test-0"
+    assert trained.find("costvolume", "train-1").step.scene == "train-1"
+    assert trained.find("matching_net").step.product == "matching_net"
+
+
+@pytest.mark.parametrize(
+    ("product", "scene", "message"),
+    [
+        pytest.param("costvolume", None, r"3 results fit \(test-0, train-0, train-1\); name a scene", id="several"),
+        pytest.param("costvolume", "nope", r"0 results fit", id="no such scene"),
+        pytest.param("confidences", None, r"0 results fit \(none\)", id="no such product"),
+    ],
+)
+def test_what_is_not_one_result_is_refused(trained: Result, product: str, scene: str | None, message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        trained.find(product, scene)
+
+
+def test_an_opened_volume_has_names_coordinates_units_and_provenance(trained: Result) -> None:
+    costs = trained.open("costvolume", "test-0")
+    assert costs["cost"].dims == ("y", "x", "d")
+    assert dict(costs.sizes) == {"y": 64, "x": 80, "d": 9}
+    assert costs["d"].values.tolist() == list(range(9))
+    assert {name: costs[name].attrs["units"] for name in ("y", "x", "d", "cost", "probability")} == {
+        "y": "px", "x": "px", "d": "px", "cost": "1", "probability": "1",
+    }  # fmt: skip
+    assert costs["cost"].sel(y=10, x=20, d=3).size == 1
+    assert costs.attrs["stage"] == "costvolume"
+    assert costs.attrs["params"]["d_max"] == 8
+    assert costs.attrs["inputs"]["matching_net"] == trained.find("matching_net").digest
+    assert "stages.matching.cost_volume" in costs.attrs["code"]
+    assert costs.attrs["extras"]["configuration"]["matching_net"]["steps"] == 2
+
+
+def test_a_volume_is_read_when_it_is_needed(trained: Result) -> None:
+    costs = trained.open("costvolume", "test-0")
+    assert all(array.chunks is not None for array in costs.data_vars.values())
+
+
+def test_a_probability_is_that_of_a_mismatch(trained: Result) -> None:
+    costs = trained.open("costvolume", "test-0").isel(y=30)
+    cost = costs["cost"].values.astype(np.float32)
+    assert np.allclose(costs["probability"].values, 1 / (1 + np.exp(-cost)), equal_nan=True)
+    assert np.isnan(cost[0, 1:]).all(), "no right pixel"
+    assert np.isfinite(cost[8:]).all()
+
+
+def test_a_disparity_comes_with_coordinates(trained: Result) -> None:
+    disparity = open_product(trained.store, trained.find("disparity", "test-0").key)["disparity"]
+    assert disparity.dims == ("y", "x")
+    assert disparity["x"].values[-1] == 79
+
+
+def test_metrics_have_the_promised_keys(trained: Result) -> None:
+    promised = {"scene", "method", "mask", "threshold_px", "R", "pixels", "raw_bad", "bad", "invalid", "avgerr", "rms"}
+    promised |= {"auc", "auc_optimal"}
+    assert [(row["mask"], row["threshold_px"]) for row in trained.metrics] == [
+        (mask, threshold) for mask in ("nonocc", "all") for threshold in (0.5, 1, 2, 4)
+    ]
+    assert all(set(row) <= promised for row in trained.metrics)
+    assert {row["R"] for row in trained.metrics} == {0.9}
+
+
+def test_a_scene_s_mask_is_told(trained: Result) -> None:
+    assert api.mask_kinds(trained) == dict.fromkeys(("test-0", "train-0", "train-1"), "exact")
+
+
+def test_status_takes_a_dataset_s_name(trained_task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PIPELINE_CACHE", str(trained_task.cache))
+    plan = api.status("synthetic:train=1,test=0,height=64,width=80,disparities=8", "channels")
+    assert [(planned.step.product, planned.state) for planned in plan.steps] == [("images", "hit"), ("channels", "hit")]
+
+
+def test_a_short_name_of_a_scene_is_enough(trained_task: Task) -> None:
+    plan = api.status(replace(trained_task, scenes=("test-0",), train=False, dataset=trained_task.dataset), "channels")
+    assert {planned.step.scene for planned in plan.steps} == {"test-0"}
+
+
+def test_explain_gives_the_step_of_the_one_scene(trained_task: Task) -> None:
+    planned = api.explain(trained_task, "confidence")
+    assert (planned.step.product, planned.step.scene, planned.state) == ("confidence", "test-0", "hit")
+    assert api.explain(trained_task, "matching_net").state == "hit"
+
+
+def test_explain_wants_one_scene() -> None:
+    task = Task("synthetic")
+    with pytest.raises(UsageError, match=r"channels of synthetic: 5 scenes fit \(train-0, .*test-1\); name one"):
+        api.explain(task, "channels")
+    assert api.explain(task, "channels", "test-1").step.scene == "test-1"
+    with pytest.raises(UsageError, match="channels of test-7: 0 scenes fit"):
+        api.explain(task, "channels", "test-7")
+
+
+def test_explain_does_not_pass_another_product_off(weights: Path, make_pair: MakePair, tmp_path: Path) -> None:
+    task = Task(f"middlebury:{make_pair(tmp_path / 'pair')}", cache=tmp_path / "cache")
+    with pytest.raises(UsageError, match=r"metrics of middlebury:.*: 0 scenes fit \(none\)"):
+        api.explain(task, "metrics")
+
+
+def test_a_sweep_names_each_combination(own_task: Task) -> None:
+    small = replace(own_task, settings=())
+    variants = api.sweep(replace(small, config=_config(own_task)), "0.1,0.9", ["disparity.subpixel=false"]).plan.targets
+    assert [variant for _, variant in variants] == [
+        "semidense.R=0.1, disparity.subpixel=false",
+        "semidense.R=0.9, disparity.subpixel=false",
+    ]
+
+
+def _config(task: Task) -> Path:
+    """Return the task's settings as a file beside its cache."""
+    tables: dict[str, list[str]] = {}
+    for setting in task.settings:
+        section, _, rest = setting.partition(".")
+        tables.setdefault(section, []).append(rest)
+    file = Path(str(task.cache)).parent / "tiny.toml"
+    file.write_text("\n".join(line for name, lines in tables.items() for line in (f"[{name}]", *lines)))
+    return file

@@ -1,0 +1,50 @@
+import inspect
+import subprocess
+import sys
+
+import pytest
+
+from stages.catalog import CATALOG, STAGES
+from stages.stage import Stage
+
+READ = {"images", "truth"}
+"""Products that no stage makes."""
+stages = pytest.mark.parametrize("stage", CATALOG, ids=lambda stage: stage.product)
+
+
+def test_every_product_comes_after_what_it_is_made_from() -> None:
+    known = set(READ)
+    for stage in CATALOG:
+        assert set(stage.inputs) <= known, stage.product
+        assert stage.product not in known, "no product twice"
+        known.add(stage.product)
+    assert list(STAGES) == [stage.product for stage in CATALOG]
+
+
+@stages
+def test_the_function_exists_and_takes_what_the_declaration_says(stage: Stage) -> None:
+    parameters = list(inspect.signature(stage.function()).parameters)
+    assert len(parameters) == (3 if stage.monitored else 2)
+    assert ("monitor" in parameters) == stage.monitored
+
+
+@stages
+def test_the_section_has_defaults_and_every_field_a_description(stage: Stage) -> None:
+    assert stage.params() == stage.params()
+    assert all(field.description for field in stage.params.model_fields.values())
+
+
+@stages
+def test_the_outputs_are_declared_completely(stage: Stage) -> None:
+    names = [output.name for output in stage.outputs]
+    assert names and len(set(names)) == len(names)
+    for output in stage.outputs:
+        assert output.dims and output.units and output.about and set(output.chunks) <= set(output.dims)
+    assert stage.tile_rows is None or (stage.tile_rows > 0 and stage.scope == "scene")
+
+
+def test_declarations_load_neither_torch_nor_numba() -> None:
+    """Planning and looking at the cache answer at once."""
+    script = "import sys, stages.catalog; sys.exit(', '.join({'torch', 'numba', 'scipy'} & set(sys.modules)) or 0)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,83 @@
+"""The same plan on a Dask cluster of two processes that share the cache's folder."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cache import Store
+from pipeline import api
+from pipeline.api import Result, Task
+from pipeline.errors import StageFailed, StageRefused
+from pipeline.execute import execute
+from pipeline.steps import Graph
+from pipeline.tasks import Made, Unwatched
+from tests.pipeline.toy import BLURRED, chain
+from tests.tiny import TRAINED
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    """The address of a scheduler with two worker processes."""
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        yield cluster.scheduler_address
+
+
+class Seen(Unwatched):
+    def __init__(self) -> None:
+        self.made: list[Made] = []
+
+    def published(self, made: Made) -> None:
+        self.made.append(made)
+
+
+def test_a_cluster_makes_the_same_keys_and_digests_as_threads(
+    scheduler: str, trained: Result, trained_task: Task, tmp_path: Path
+) -> None:
+    seen = Seen()
+    task = replace(trained_task, cache=tmp_path / "shared")
+    result = api.run(task, scheduler=scheduler, watch=seen)
+    assert {step_id: (made.key, made.digest) for step_id, made in result.made.items()} == {
+        step_id: (made.key, made.digest) for step_id, made in trained.made.items()
+    }
+    assert list(result.made) == list(trained.made), "in the order of the plan"
+    assert len(seen.made) == len(trained.made)
+    assert result.metrics == trained.metrics
+    assert list((tmp_path / "shared" / "drafts").iterdir()) == []
+
+
+def test_the_command_line_finds_the_scheduler(scheduler: str, invoke: Callable[..., Any], own_cache: Path) -> None:
+    ran = invoke("run", *TRAINED, "--cache", own_cache, "--scheduler", scheduler, "--set", "semidense.R=0.5")
+    assert ran.code == 0, ran.err
+    assert ran.out.splitlines()[-1] == "reused 20 products, made 1 semidense, 1 metrics"
+
+
+def run(graph: Graph, store: Store, scheduler: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, Made]:
+    from pipeline import plan as planning
+
+    monkeypatch.setattr(planning, "build", lambda _: graph)
+    request: Any = None
+    return execute(planning.make_plan(request, store), store, Unwatched(), {}, scheduler)
+
+
+@pytest.mark.parametrize(
+    ("function", "kind", "message"),
+    [
+        ("fail_below", StageFailed, r"blurred of Toy, rows \d-\d: the fourth row broke it"),
+        ("refuse", StageRefused, r"blurred of Toy, rows \d-\d: these values are no good"),
+    ],
+)
+def test_a_stage_that_fails_on_a_cluster_is_named_and_leaves_nothing(
+    scheduler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, function: str, kind: type[Exception], message: str
+) -> None:
+    store = Store(tmp_path / "shared")
+    with pytest.raises(kind, match=message):
+        run(chain(stage=replace(BLURRED, compute=f"tests.pipeline.toy:{function}")), store, scheduler, monkeypatch)
+    assert list(store.layout.drafts.iterdir()) == []
+    assert [entry.label["product"] for entry in store.entries()] == ["ramp"]
+    made = run(chain(), store, scheduler, monkeypatch)
+    assert [each.reused for each in made.values()] == [True, False, False]

@@ -1,0 +1,90 @@
+"""The command in a process of its own: speed of --help, stdout and stderr, exit codes."""
+
+import json
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipeline.api import Result
+from tests.tiny import TRAINED
+
+Command = Callable[..., Any]
+HELP_SECONDS = 0.5
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["cache", "--help"]], ids=" ".join)
+def test_help_answers_at_once(command: Command, arguments: list[str]) -> None:
+    command(*arguments)  # bytecode
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    ran = command(*arguments)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert ran.code == 0
+    assert "Usage: pipeline" in ran.out or "Usage: -c" in ran.out
+    assert after.ru_utime - before.ru_utime < HELP_SECONDS
+
+
+def test_help_loads_nothing_heavy(project: Path) -> None:
+    code = (
+        "import sys\nfrom pipeline.cli import app\n"
+        "try:\n    app(['run', '--help'])\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'torch', 'dask', 'zarr', 'xarray', 'numba', 'matplotlib', 'skimage', 'pydantic'}\n"
+        "print('loaded', sorted(heavy & set(sys.modules)))"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], cwd=project, capture_output=True, text=True, check=True)
+    assert ran.stdout.splitlines()[-1] == "loaded []"
+
+
+def test_the_installed_command_is_this_one() -> None:
+    installed = Path(sys.executable).with_name("pipeline")
+    if not installed.is_file():
+        pytest.skip("the package is not installed in this environment: pip install -e .")
+    ran = subprocess.run([installed, "--help"], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert "Usage: pipeline" in ran.stdout
+
+
+def test_results_go_to_stdout_and_notes_to_stderr(command: Command, trained: Result, tmp_path: Path) -> None:
+    ran = command("run", *TRAINED, "--cache", trained.store.root, cwd=tmp_path)
+    assert ran.code == 0
+    assert ran.out.splitlines()[-1] == "reused 22 products, made nothing"
+    assert {line.split(":")[0] for line in ran.err.splitlines()} == {"note"}
+    assert list(tmp_path.iterdir()) == [], "nothing is written where one stands"
+
+
+def test_progress_of_a_run_stays_out_of_json(command: Command, own_cache: Path) -> None:
+    ran = command("run", *TRAINED, "--set", "semidense.R=0.5", "--cache", own_cache, "--json")
+    assert ran.code == 0, ran.err
+    assert set(json.loads(ran.out)) == {"steps", "metrics", "files"}
+    assert [step["state"] for step in json.loads(ran.out)["steps"]].count("made") == 2
+
+
+def test_a_mistake_is_one_line_and_exit_code_2(command: Command, tmp_path: Path) -> None:
+    ran = command("run", "motorcycl", "--cache", tmp_path / "cache")
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.count("\n") == 1
+    assert not (tmp_path / "cache").exists()
+
+
+def test_a_reader_that_has_seen_enough_is_no_fault(start: Callable[..., Any], trained: Result) -> None:
+    process = start("cache", "ls", "--cache", trained.store.root)
+    process.stdout.close()
+    assert "Traceback" not in process.stderr.read()
+    process.wait(timeout=30)
+
+
+def test_a_plan_that_is_all_hits_loads_no_network(trained: Result, project: Path) -> None:
+    code = (
+        "import sys\nfrom pipeline.cli import app\n"
+        "try:\n    app(sys.argv[1:])\nexcept SystemExit:\n    pass\n"
+        "print('loaded', sorted({'torch', 'numba', 'dask', 'matplotlib'} & set(sys.modules)))"
+    )
+    arguments = ["status", *TRAINED, "--cache", str(trained.store.root)]
+    ran = subprocess.run(
+        [sys.executable, "-c", code, *arguments], cwd=project, capture_output=True, text=True, check=True
+    )
+    assert ran.stdout.splitlines()[-1] == "loaded []"

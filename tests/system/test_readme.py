@@ -1,0 +1,65 @@
+"""Every command that the README shows is one."""
+
+import re
+import shlex
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+import typer
+import typer.main
+
+from pipeline.cli import app
+
+README = Path(__file__).parents[2] / "README.md"
+BLOCKS = re.findall(r"^```\w*\n(.*?)^```", README.read_text(), re.DOTALL | re.MULTILINE) if README.is_file() else []
+LINES = [line.strip() for block in BLOCKS for line in block.splitlines()]
+INLINE = re.findall(r"`(pipeline [^`]+)`", README.read_text()) if README.is_file() else []
+COMMANDS = [re.sub(r"^\S*?bin/", "", line) for line in LINES if re.match(r"(\S*bin/)?pipeline(\s|$)", line)]
+TARGETS = {line.split()[1] for line in LINES if line.startswith("make ")}
+
+
+def parse(line: str) -> None:
+    """Parse a command without running it; raise what the command line would refuse."""
+    command = typer.main.get_command(app)
+    arguments = shlex.split(line, comments=True)[1:]
+    context = command.make_context("pipeline", arguments, resilient_parsing=False)
+    while hasattr(command, "commands"):
+        name, found, rest = command.resolve_command(context, [*context._protected_args, *context.args])
+        context = found.make_context(name, rest, parent=context)
+        command = found
+
+
+def test_the_readme_shows_commands() -> None:
+    assert len(COMMANDS) >= 10
+
+
+@pytest.mark.parametrize("line", [*COMMANDS, *INLINE])
+def test_a_command_of_the_readme_parses(line: str) -> None:
+    parse(line)
+
+
+@pytest.mark.parametrize("line", ["pipeline runn", "pipeline run --nope", "pipeline cache list", "pipeline run a b"])
+def test_a_command_that_is_none_does_not_parse(line: str) -> None:
+    with pytest.raises(Exception, match=r"(?i)no such|unexpected"):
+        parse(line)
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_the_settings_and_thresholds_of_the_readme_are_valid(line: str) -> None:
+    from pipeline.api import _alternatives, parse_thresholds
+    from pipeline.config import Config
+
+    arguments = shlex.split(line, comments=True)
+    given = list(pairwise(arguments))
+    settings = [value for name, value in given if name == "--set"]
+    for setting in settings:
+        for each in _alternatives(setting) if "sweep" in arguments else [setting]:
+            Config.load(None, [each])
+    for _, value in [pair for pair in given if pair[0] == "--R"]:
+        assert parse_thresholds(value)
+
+
+@pytest.mark.parametrize("target", sorted(TARGETS))
+def test_a_target_of_the_readme_is_in_the_makefile(target: str) -> None:
+    assert re.search(rf"^{re.escape(target)}:", README.with_name("Makefile").read_text(), re.MULTILINE)

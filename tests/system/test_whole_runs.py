@@ -1,0 +1,155 @@
+"""Whole runs on synthetic scenes: what is promised of caching, seen from outside."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import dask
+import numpy as np
+import pytest
+import zarr
+
+from pipeline import api
+from pipeline.api import Result, Task
+from pipeline.execute import totals
+from pipeline.steps import PRODUCTS
+from stages.catalog import STAGES
+
+Invoke = Callable[..., Any]
+
+
+def made(result: Result) -> dict[str, int]:
+    """How many results of each product a run made."""
+    return {product: fresh for product, (_, fresh) in totals(result.made.values()).items() if fresh}
+
+
+def digests(result: Result) -> dict[tuple[str, str], tuple[str, str]]:
+    return {(each.step.product, each.step.scene): (each.key, each.digest) for each in result.made.values()}
+
+
+def test_a_run_makes_every_product_of_every_scene(trained: Result) -> None:
+    three = dict.fromkeys(("images", "truth", "channels", "costvolume", "disparity"), 3)
+    assert made(trained) == dict.fromkeys(PRODUCTS, 1) | three
+
+
+@pytest.mark.parametrize("product", [name for name, stage in STAGES.items() if stage.scope == "scene"])
+def test_every_array_is_as_declared(trained: Result, product: str) -> None:
+    dataset = trained.open(product, "test-0")
+    for output in STAGES[product].outputs:
+        array = dataset[output.name]
+        assert array.dims == output.dims
+        assert array.dtype == (output.dtype or array.dtype)
+        assert array.attrs["units"] == output.units
+
+
+def test_the_second_run_finds_all_and_computes_nothing(
+    trained: Result, trained_task: Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("something was computed")
+
+    monkeypatch.setattr(dask, "compute", refuse)
+    again = api.run(trained_task)
+    assert made(again) == {}
+    assert digests(again) == digests(trained)
+    assert again.metrics == trained.metrics
+
+
+def test_the_filtered_map_is_the_raw_one_where_it_is_trusted(trained: Result) -> None:
+    raw, kept, trust = (
+        trained.open(product, "test-0")[name].values
+        for product, name in (("disparity", "disparity"), ("semidense", "disparity"), ("confidence", "confidence"))
+    )
+    assert np.array_equal(kept, np.where(trust >= np.float32(0.9), raw, np.nan), equal_nan=True)
+    assert np.nanmin(trust) >= 0
+    assert np.nanmax(trust) <= 1
+
+
+@pytest.mark.parametrize(
+    "setting", ["semidense.R=0.4", "disparity.subpixel=true", "costvolume.d_max=6"], ids=lambda text: text
+)
+def test_a_dry_run_is_what_the_run_then_does(own_task: Task, setting: str) -> None:
+    task = replace(own_task, settings=(*own_task.settings, setting))
+    plan = api.status(task)
+    result = api.run(task)
+    assert [planned.step.id for planned in plan.steps] == list(result.made)
+    assert [(planned.step.name, planned.state == "hit") for planned in plan.steps] == [
+        (each.step.name, each.reused) for each in result.made.values()
+    ]
+    assert all(planned.key in (None, result.made[planned.step.id].key) for planned in plan.steps)
+
+
+def test_a_run_goes_on_from_where_another_stopped(weights: Path, tmp_path: Path, trained: Result) -> None:
+    task = Task("synthetic:train=0,test=1,height=64,width=80,disparities=8", cache=tmp_path / "cache")
+    first = api.run(task, "costvolume")
+    assert made(first) == dict.fromkeys(("images", "channels", "matching_net", "costvolume"), 1)
+    assert first.metrics == []
+    second = api.run(task)
+    assert not {"images", "channels", "matching_net", "costvolume"} & set(made(second))
+    assert second.find("metrics").digest == trained.find("metrics").digest
+
+
+def test_a_sweep_touches_nothing_above_the_filter_and_says_so(invoke: Invoke, own_task: Task, tmp_path: Path) -> None:
+    options = [text for setting in own_task.settings for text in ("--set", setting)]
+    shared = [own_task.dataset, "--train", "--cache", str(own_task.cache)]
+    before = set((Path(str(own_task.cache)) / "records").rglob("*.json"))
+    ran = invoke("sweep", *shared, *options, "--R", "0.05:0.95:0.05", "-o", tmp_path / "sweep")
+    assert ran.code == 0, ran.err
+    # 0.9, the default, is one of the nineteen
+    assert ran.out.splitlines()[-1] == "reused 22 products, made 18 semidense, 18 metrics"
+    fresh = set((Path(str(own_task.cache)) / "records").rglob("*.json")) - before
+    assert len(fresh) == 36
+
+
+def test_a_sweep_over_a_setting_makes_every_combination(own_task: Task) -> None:
+    settings = ("costvolume.precision=float32,bfloat16",)
+    result = api.sweep(own_task, "0.5,0.9", settings)
+    assert {row["variant"] for row in result.metrics} == {
+        f"semidense.R={R}, costvolume.precision={precision}"
+        for R in ("0.5", "0.9")
+        for precision in ("float32", "bfloat16")
+    }
+    assert made(result)["semidense"] == 3, "one of the four is there"
+
+
+def test_a_forced_product_is_made_again_and_equal(own_task: Task, trained: Result) -> None:
+    result = api.run(own_task, forced=["channels", "evaluation_net"])
+    assert made(result) == {"channels": 3, "evaluation_net": 1}
+    assert digests(result) == digests(trained)
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_the_number_of_workers_changes_no_key_and_no_digest(
+    trained_task: Task, trained: Result, tmp_path: Path, workers: int
+) -> None:
+    task = replace(trained_task, cache=tmp_path / "cache")
+    assert digests(api.run(task, "disparity", workers=workers)).items() <= digests(trained).items()
+
+
+def test_one_row_a_tile_or_all_at_once_is_the_same(
+    trained: Result, weights: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The runner's tiles of the real stages: other keys, since the tiling is in them, and the same numbers."""
+    from pipeline import steps
+
+    for rows in (13, 64):
+        cut = {name: replace(stage, tile_rows=stage.tile_rows and rows) for name, stage in STAGES.items()}
+        monkeypatch.setattr(steps, "STAGES", cut)
+        task = Task("synthetic:train=0,test=1,height=64,width=80,disparities=8", cache=tmp_path / str(rows))
+        result = api.run(task, "semidense")
+        for product, name in (("channels", "channels"), ("costvolume", "cost"), ("disparity", "disparity")):
+            found, expected = (
+                np.asarray(each.store.arrays(each.find(product, "test-0").key)[name][...]) for each in (result, trained)
+            )
+            assert np.array_equal(found, expected, equal_nan=True), (product, rows)
+        array: zarr.Array = result.store.arrays(result.find("disparity").key)["disparity"]
+        assert array.chunks[0] == min(rows, 64)
+
+
+def test_nothing_is_left_in_drafts_or_checkpoints(trained: Result) -> None:
+    root = trained.store.root
+    left = [
+        path for folder in ("drafts", "checkpoints") if (root / folder).is_dir() for path in (root / folder).iterdir()
+    ]
+    assert left == []
