@@ -275,7 +275,7 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)
     try:
-        app()
+        app(prog_name="pipeline")
     except _Stopped as stop:
         _leave(128 + int(stop.args[0]))
     except Exception as error:

@@ -46,11 +46,11 @@ def draw(found: Inspection, png: Path, pixel: str | None, disparity: int | None)
     Raises:
         UsageError: if the pixel or the disparity is not one of the product's.
     """
-    from pipeline.views.figures import figure, save_png
+    from pipeline.views.figures import figure, product_title, save_png
 
     step = found.planned.step
     place = _parse_pixel(pixel, found.dataset) if pixel else None
-    title = f"{step.product} of {step.scene}"
+    title = product_title(found.dataset)
     save_png(figure(step.product, found.dataset, title=title, pixel=place, disparity=disparity), png)
 
 

@@ -21,6 +21,8 @@ from stages.disparity import winner_take_all
 _TICKS = (0.5, 0.01, 0.99, 0.1, 0.9, 1e-4, 0.9999, 1e-6, 0.999999, 1e-8, 0.99999999)
 """Probabilities on an axis of log-odds, the most telling first."""
 _HALO = withStroke(linewidth=5, foreground="white")
+_CURVE_HEIGHT = 3.5
+"""Height that the curve needs beside a very wide image, inches."""
 _ROWS = 32
 """Rows in the middle of the image that the usual disparity is taken from."""
 
@@ -43,7 +45,7 @@ def draw_costs(
     y, x = _pixel(dataset["cost"], pixel)
     index = _index(dataset["cost"], disparities, disparity)
     costs = dataset["cost"].isel(d=index).values.astype(np.float32)
-    left, right = image_panels(figure, costs.shape, columns=2)[0]
+    left, right = image_panels(figure, costs.shape, columns=2, least_height=_CURVE_HEIGHT)[0]
     _draw_slice(left, costs, int(disparities[index]))
     left.plot(x, y, "o", markersize=10, markerfacecolor="none", markeredgecolor="black", path_effects=[_HALO])
     curve = dataset["cost"].isel(y=y, x=x).values.astype(np.float32)
@@ -82,9 +84,9 @@ def _index(cost: xr.DataArray, disparities: NDArray[np.int_], disparity: int | N
 def _draw_slice(axes: Axes, costs: NDArray[np.float32], disparity: int) -> None:
     known = np.abs(costs[np.isfinite(costs)])
     reach = float(np.percentile(known, 99)) if known.size else 1.0
-    label = "cost: log-odds of a mismatch (below 0: rather a match)"
-    draw_map(axes, costs, Scale(cost_colours(), -max(reach, 1e-3), max(reach, 1e-3), label))
-    axes.set_title(f"costs at the disparity {disparity} px")
+    scale = Scale(cost_colours(), -max(reach, 1e-3), max(reach, 1e-3), "cost (log-odds)")
+    draw_map(axes, costs, scale)
+    axes.set_title(f"costs at the disparity {disparity} px (below 0: rather a match)")
 
 
 def draw_curve(axes: Axes, disparities: NDArray[np.int_], costs: NDArray[np.float32]) -> None:

@@ -93,6 +93,7 @@ def draw_confidence(figure: Figure, dataset: xr.Dataset) -> None:
     """Draw a confidence map on the scale from 0 to 1."""
     confidence = dataset["confidence"].values
     axes = image_panels(figure, confidence.shape)[0, 0]
-    scale = Scale(confidence_colours(), 0, 1, "confidence: probability that the disparity is right")
+    scale = Scale(confidence_colours(), 0, 1, "confidence (0 to 1)")
     draw_map(axes, confidence, scale)
+    axes.set_title("probability that the disparity is right")
     legend_below(figure, (none_patch(confidence),))

@@ -56,12 +56,14 @@ def new_figure(title: str) -> Figure:
     return figure
 
 
-def image_panels(figure: Figure, size: tuple[int, int], rows: int = 1, columns: int = 1) -> NDArray[Any]:
+def image_panels(
+    figure: Figure, size: tuple[int, int], rows: int = 1, columns: int = 1, least_height: float = 1.0
+) -> NDArray[Any]:
     """Return (row, column) axes for images of ``size``, rows and columns in px, in a figure of fitting size.
 
-    A very tall or very wide image is given a panel of at most 2:1 or 1:6.
+    A panel is at least ``least_height`` inches high, and at most twice as high as it is wide.
     """
-    height = PANEL * float(np.clip(size[0] / size[1], 1 / 6, 2))
+    height = float(np.clip(PANEL * size[0] / size[1], least_height, 2 * PANEL))
     figure.set_size_inches(columns * (PANEL + _MARGINS[0]), rows * (height + _MARGINS[1]) + _HEAD)
     axes: NDArray[Any] = figure.subplots(rows, columns, squeeze=False)
     for each in axes.flat:

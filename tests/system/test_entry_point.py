@@ -24,7 +24,7 @@ def test_help_answers_at_once(command: Command, arguments: list[str]) -> None:
     ran = command(*arguments)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert ran.code == 0
-    assert "Usage: pipeline" in ran.out or "Usage: -c" in ran.out
+    assert "Usage: pipeline" in ran.out
     assert after.ru_utime - before.ru_utime < HELP_SECONDS
 
 
@@ -57,7 +57,7 @@ def test_results_go_to_stdout_and_notes_to_stderr(command: Command, trained: Res
 
 
 def test_progress_of_a_run_stays_out_of_json(command: Command, own_cache: Path) -> None:
-    ran = command("run", *TRAINED, "--set", "semidense.R=0.5", "--cache", own_cache, "--json")
+    ran = command("run", *TRAINED, "--set", "semidense.R=0", "--cache", own_cache, "--json")
     assert ran.code == 0, ran.err
     assert set(json.loads(ran.out)) == {"steps", "metrics", "files"}
     assert [step["state"] for step in json.loads(ran.out)["steps"]].count("made") == 2

@@ -155,9 +155,7 @@ def test_a_command_line_that_is_none_exits_with_2_and_writes_to_stderr(invoke: I
     assert ran.out == "" or arguments == ["cache"]
 
 
-def test_a_fault_of_the_program_is_a_traceback_and_exit_code_1(
-    command: Callable[..., Any], tmp_path: Path, project: Path
-) -> None:
+def test_a_fault_of_the_program_is_a_traceback_and_exit_code_1(tmp_path: Path, project: Path) -> None:
     code = (
         "import sys; from pipeline import sources, cli\n"
         "def broken(*_): raise RuntimeError('bang')\n"

@@ -62,7 +62,11 @@ def test_every_product_of_the_pipeline_has_a_figure() -> None:
         pytest.param(
             "evaluation_net", ["value of a parameter", "101 parameters", "1 are zero"], id="shipped-net-has-no-curve"
         ),
-        pytest.param("confidence", ["probability that the disparity is right", "none: 0.0 %"], id="zero-to-one"),
+        pytest.param(
+            "confidence",
+            ["probability that the disparity is right", "confidence (0 to 1)", "none: 0.0 %"],
+            id="zero-to-one",
+        ),
         pytest.param("semidense", ["disparity (px)", "none: 8.3 %"], id="as-disparity"),
         pytest.param(
             "metrics", ["threshold\n(px)", "raw_bad\n(%)", "rms\n(px)", "nonocc", "1,234", "n/a"], id="readable-table"

@@ -1,7 +1,10 @@
+import warnings
+
 import numpy as np
 import pytest
 
-from pipeline.views.maps import draw_channels, draw_images
+from pipeline.views.costs import draw_costs
+from pipeline.views.maps import draw_channels, draw_confidence, draw_images
 from pipeline.views.networks import draw_network, trailing_mean
 from pipeline.views.panels import disparity_scale, draw_map, image_panels, new_figure, share_patch
 from pipeline.views.samples import draw_evaluation_samples, draw_matching_samples
@@ -94,3 +97,15 @@ def test_a_short_curve_has_no_mean() -> None:
 
 def test_trailing_mean() -> None:
     assert trailing_mean(np.array([1, 3, 5, 7], np.float32), 2).tolist() == [2, 4, 6]
+
+
+@pytest.mark.parametrize("product", ["costvolume", "confidence", "channels"])
+def test_the_labels_of_a_very_wide_image_find_room(product: str) -> None:
+    figure = new_figure("any")
+    dataset = products.PRODUCTS[product]()
+    wide = dataset.isel(x=np.arange(60) % 6)
+    {"costvolume": draw_costs, "confidence": draw_confidence, "channels": draw_channels}[product](figure, wide)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # Matplotlib warns when a layout has no room
+        figure.draw_without_rendering()
+    assert all(axes.get_position().width > 0.2 for axes in figure.axes[:2])
