@@ -100,7 +100,7 @@ def sweep(
     """Filter at many thresholds R, and over several values of any setting; say what was reused."""
     from pipeline import api, console
     from pipeline.progress import ProgressWatch
-    from pipeline.sweep import print_sweep, write_sweep
+    from pipeline.sweep_report import print_sweep, write_sweep
 
     task = _task(dataset, scene, None, config, train, cache)
     with ProgressWatch() as watch:
@@ -145,7 +145,7 @@ def explain(
 ) -> None:
     """Show what a product's key is made of."""
     from pipeline import api
-    from pipeline.explain import explanation, print_explanation
+    from pipeline.explanation import explanation, print_explanation
 
     planned = api.explain(_task(dataset, scene, settings, config, train, cache), product)
     found = explanation(planned, api.open_store(cache))
@@ -257,7 +257,7 @@ def _say_files(files: list[Path]) -> None:
 def _export(result: "Result", output: Path | None) -> list[Path]:
     if output is None:
         return []
-    from pipeline.export import export
+    from pipeline.exporter import export
 
     return export(result, output)
 

@@ -16,7 +16,7 @@ from datasets.formats.pfm import read_pfm
 from pipeline import shipped
 from pipeline.api import METHOD, Result
 from pipeline.errors import UsageError
-from pipeline.export import COLUMNS, export, writable_folder, write_rows
+from pipeline.exporter import COLUMNS, export, writable_folder, write_rows
 from pipeline.plan import Plan
 from pipeline.sources import IMAGES, TRUTH
 from pipeline.steps import SPLIT, Step

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.console import mean_rows, print_metrics
-from pipeline.export import writable_folder, write_rows
+from pipeline.exporter import writable_folder, write_rows
 from pipeline.views.figures import error_curve_figure, save_png
 
 THRESHOLD_PX = 1.0

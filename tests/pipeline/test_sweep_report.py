@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.api import Result
 from pipeline.errors import UsageError
-from pipeline.sweep import print_sweep, write_sweep
+from pipeline.sweep_report import print_sweep, write_sweep
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import pytest
 
 from cache import Store
 from pipeline.api import Result, Task, explain
-from pipeline.explain import explanation, print_explanation
+from pipeline.explanation import explanation, print_explanation
 from pipeline.plan import Plan
 from tests.pipeline.toy import chain
 
