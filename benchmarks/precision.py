@@ -18,14 +18,12 @@ from rich.table import Table
 from datasets import SceneSource, open_dataset
 from pipeline.shipped import read_shipped_weights
 from stages.disparity import winner_take_all
-from stages.matching.cost_volume import cost_volume
+from stages.matching.cost_volume import padded_cost_volume
+from stages.matching.declaration import RADIUS
 from stages.matching.net import MatchingNet, net_from_parameters
 from stages.metrics import raw_bad
 from stages.precision import Precision, fast_bfloat16
 from stages.transforms.channels import channels
-
-MARGIN = 5
-"""Rows of context above and below, so that the rows measured are those of the whole image."""
 
 
 def measure(scene: SceneSource, net: MatchingNet, rows: int) -> dict[str, Any]:
@@ -33,9 +31,10 @@ def measure(scene: SceneSource, net: MatchingNet, rows: int) -> dict[str, Any]:
     loaded = scene.load()
     if loaded.truth is None:
         raise typer.BadParameter(f"{scene.name} has no ground truth")
-    first = max(MARGIN, (scene.size[0] - rows) // 2)
-    block = channels(loaded.left, loaded.right)[:, :, first - MARGIN : first + rows + MARGIN]
-    truth, mask = (array[first : first + rows] for array in (loaded.truth.disparity, loaded.truth.nonocc))
+    first = max(RADIUS, (scene.size[0] - rows) // 2)
+    block = channels(loaded.left, loaded.right)[:, :, first - RADIUS : first + rows + RADIUS]
+    truth = loaded.truth.disparity[first : first + rows]
+    mask = loaded.truth.nonocc[first : first + rows]
     disparities = range(scene.disparities.minimum, scene.disparities.maximum + 1)
     costs = {precision: _costs(net, block, disparities, precision) for precision in ("float32", "bfloat16")}
     maps = {precision: winner_take_all(cost, disparities.start) for precision, cost in costs.items()}
@@ -53,12 +52,14 @@ def measure(scene: SceneSource, net: MatchingNet, rows: int) -> dict[str, Any]:
 def _costs(
     net: MatchingNet, block: NDArray[np.float32], disparities: range, precision: Precision
 ) -> NDArray[np.float32]:
-    return cost_volume(net, block, disparities, precision)[MARGIN:-MARGIN]
+    """Return the costs of a block that brings its rows of context, but not what lies beyond its sides."""
+    padded = np.pad(block, ((0, 0), (0, 0), (0, 0), (RADIUS, RADIUS)), mode="edge")
+    return padded_cost_volume(net, padded, disparities, precision)
 
 
-def main(
-    dataset: str = "motorcycle",
-    rows: Annotated[int, typer.Option(help="rows of each scene")] = 8,
+def compare(
+    dataset: Annotated[str, typer.Argument(help="such as middlebury:DIR")] = "motorcycle",
+    rows: Annotated[int, typer.Option(help="rows of each scene")] = 16,
     out: Annotated[Path | None, typer.Option("--json", help="write the figures here")] = None,
 ) -> None:
     """Measure, print a table and write JSON."""
@@ -76,4 +77,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    typer.run(compare)

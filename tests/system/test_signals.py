@@ -40,9 +40,9 @@ def test_a_signal_in_the_middle_of_a_stage(start: Start, own_cache: Path, number
 
 
 def test_training_that_was_killed_goes_on_and_comes_out_the_same(start: Start, tmp_path: Path, trained: Result) -> None:
-    """The checkpoint after the first of the two steps is what the second run starts from."""
+    """A checkpoint after each step: the second run starts from the last."""
     cache = tmp_path / "cache"
-    more = ("matching_net.checkpoint_steps=1", "matching_net.steps=40")
+    more = ("matching_net.checkpoint_steps=1", "matching_net.steps=16")
     arguments = ("run", SPEC, "--train", *options(*more), "--upto", "matching_net", "--cache", cache)
     process = start(*arguments)
     wait_for(lambda: any((cache / "checkpoints").glob("[0-9a-f]*")), process)
