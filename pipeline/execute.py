@@ -1,6 +1,7 @@
 """Carry out a plan: its steps become Dask tasks, on this machine's threads or on a cluster."""
 
 import os
+import time
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -12,6 +13,9 @@ from pipeline.plan import Plan, Planned
 from pipeline.steps import Step
 from pipeline.tasks import Context, Made, Unwatched, Watch
 from pipeline.tiles import cut_rows
+
+SETTLE_SECONDS = 0.3
+"""How long a worker of a cluster may take for the write that it is in when its run ends early."""
 
 
 def execute(
@@ -70,7 +74,7 @@ def _on_cluster(plan: Plan, context: Context, watch: Watch, address: str) -> dic
     from distributed import Client, as_completed
 
     try:
-        client = Client(address, timeout="10s")
+        client = Client(address, timeout="10s", set_as_default=False)
     except (OSError, ValueError) as error:
         raise UsageError(f"no Dask scheduler answers at {address}: {error}") from None
     results, jobs = _graph(plan, context)
@@ -79,7 +83,7 @@ def _on_cluster(plan: Plan, context: Context, watch: Watch, address: str) -> dic
         begun = futures[len(results) :]
         made = {}
         try:
-            for future in as_completed(futures[: len(results)]):
+            for future in as_completed(futures[: len(results)], loop=client.loop):
                 each: Made = future.result()
                 made[each.step.id] = each
                 if not each.reused:
@@ -91,12 +95,14 @@ def _on_cluster(plan: Plan, context: Context, watch: Watch, address: str) -> dic
 
 
 def _abandon(client: Any, begun: Iterable[Any]) -> None:  # noqa: ANN401 - Dask's types carry no annotations
-    """Delete the drafts of a run that ends early: the workers, who own them, may live on for long."""
+    """Leave the cluster and delete the drafts of a run that ends early: the workers, who own them, may live on."""
     drafts = [future.result().draft for future in begun if future.status == "finished"]
-    client.cancel(list(begun))
-    for draft in drafts:
-        if draft is not None:
-            draft.discard()
+    client.close()  # this releases what is still to be computed
+    for _ in range(2):  # a write that is under way brings its folder back, once
+        for draft in drafts:
+            if draft is not None:
+                draft.discard()
+        time.sleep(SETTLE_SECONDS)
 
 
 def _graph(plan: Plan, context: Context) -> tuple[list[Any], list[Any]]:

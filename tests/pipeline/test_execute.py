@@ -189,7 +189,7 @@ def test_nothing_is_written_after_a_failure(
 
     monkeypatch.setattr(toy, "fail_below", one_slow_one_broken)
     with pytest.raises(StageFailed):
-        toy_run(failing("fail_below"))
+        toy_run(failing("fail_below"), workers=3)
     assert drafts() == []
     assert [entry.label["product"] for entry in store.entries()] == ["ramp"]
 

@@ -33,7 +33,6 @@ def replace(text: str, old: str, new: str) -> str:
 @pytest.mark.parametrize(
     ("file", "edit", "stale", "named"),
     [
-        pytest.param(None, str, set(), set(), id="a copy elsewhere"),
         pytest.param(
             "stages/transforms/rank.py",
             lambda text: "# a comment\n\n" + text.replace('"""', '"""Moved. ', 1) + "\n# the end\n",
@@ -64,12 +63,12 @@ def test_an_edit_of_the_sources(
     command: Callable[..., Any],
     sources: Path,
     trained: Result,
-    file: str | None,
+    file: str,
     edit: Callable[[str], str],
     stale: set[str],
     named: set[str],
 ) -> None:
-    path = sources / (file or "pipeline/console.py")
+    path = sources / file
     original = path.read_text()
     try:
         path.write_text(edit(original))

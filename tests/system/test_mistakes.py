@@ -133,8 +133,8 @@ def test_a_scheduler_that_does_not_answer_is_refused(
     import distributed
 
     class Impatient(distributed.Client):
-        def __init__(self, address: str, timeout: str) -> None:
-            super().__init__(address, timeout="0.5s")
+        def __init__(self, address: str, **options: object) -> None:
+            super().__init__(address, **{**options, "timeout": "0.5s"})
 
     monkeypatch.setattr(distributed, "Client", Impatient)
     cache = tmp_path / "cache"

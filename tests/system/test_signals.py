@@ -1,5 +1,6 @@
 """A run that is told to stop leaves no drafts, and what it had made is found again."""
 
+import shutil
 import signal
 import subprocess
 import time
@@ -8,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.api import Result, Task, status
+from pipeline.api import Task, run, status
+from pipeline.steps import Step
+from pipeline.tasks import Unwatched
 from tests.tiny import SETTINGS, SPEC, options
 
 Start = Callable[..., "subprocess.Popen[str]"]
@@ -39,26 +42,34 @@ def test_a_signal_in_the_middle_of_a_stage(start: Start, own_cache: Path, number
     }  # fmt: skip
 
 
-def test_training_that_was_killed_goes_on_and_comes_out_the_same(start: Start, tmp_path: Path, trained: Result) -> None:
+def test_training_that_was_killed_goes_on_and_comes_out_the_same(start: Start, own_cache: Path, tmp_path: Path) -> None:
     """A checkpoint after each step: the second run starts from the last."""
-    cache = tmp_path / "cache"
+    other = shutil.copytree(own_cache, tmp_path / "other")
     more = ("matching_net.checkpoint_steps=1", "matching_net.steps=16")
-    arguments = ("run", SPEC, "--train", *options(*more), "--upto", "matching_net", "--cache", cache)
-    process = start(*arguments)
-    wait_for(lambda: any((cache / "checkpoints").glob("[0-9a-f]*")), process)
+    process = start("run", SPEC, "--train", *options(*more), "--upto", "matching_net", "--cache", own_cache)
+    wait_for(lambda: any((own_cache / "checkpoints").glob("[0-9a-f]*")), process)
     process.kill()
     process.communicate()
-    (checkpoint,) = (cache / "checkpoints").glob("[0-9a-f]*")
-    assert checkpoint.stat().st_size > 1000
-    resumed = start(*arguments)
-    resumed.communicate(timeout=120)
-    assert resumed.returncode == 0
-    assert not list((cache / "checkpoints").glob("[0-9a-f]*"))
-    assert not list((cache / "drafts").iterdir()), "the drafts of the dead are swept"
-    undisturbed = start(*arguments[:-1], tmp_path / "other")
-    undisturbed.communicate(timeout=120)
-    task = Task(SPEC, settings=(*SETTINGS, *more), train=True)
-    plans = [status(Task(task.dataset, settings=task.settings, train=True, cache=root), "matching_net")
-             for root in (cache, tmp_path / "other")]  # fmt: skip
-    assert plans[0].todo() == plans[1].todo() == ()
-    assert [planned.digest for planned in plans[0].steps] == [planned.digest for planned in plans[1].steps]
+    assert [path.stat().st_size > 1000 for path in (own_cache / "checkpoints").glob("[0-9a-f]*")] == [True]
+    notes = Notes()
+    resumed, undisturbed = (
+        run(Task(SPEC, settings=(*SETTINGS, *more), train=True, cache=cache), "matching_net", watch=notes)
+        for cache in (own_cache, other)
+    )
+    assert resumed.find("matching_net").digest == undisturbed.find("matching_net").digest
+    first = notes.steps.index(16) + 1
+    assert notes.steps[first:] == list(range(1, 17)), "from the start"
+    assert notes.steps[0] > 1, "from a checkpoint"
+    for folder in ("checkpoints", "drafts"):
+        assert list((own_cache / folder).iterdir()) == [], "what the dead left is swept"
+
+
+class Notes(Unwatched):
+    """The training steps that were taken."""
+
+    def __init__(self) -> None:
+        self.steps: list[int] = []
+
+    def advanced(self, step: Step, done: int, total: int, note: str) -> None:
+        if note:
+            self.steps.append(done)
