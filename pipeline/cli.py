@@ -15,8 +15,9 @@ app = typer.Typer(
     help="Semi-dense stereo matching with two CNNs; every stage is cached.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # rich takes as long to import as all the rest of --help
     add_completion=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 cache_app = typer.Typer(help="Look into the cache.", no_args_is_help=True)
 data_app = typer.Typer(help="Look at datasets.", no_args_is_help=True)
