@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import TypeVar, cast
 
 import numba
+from numba.extending import register_jitable
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -16,3 +17,9 @@ def kernel(function: Function) -> Function:
     checks an index: the public function around a kernel checks what it is given.
     """
     return cast(Function, numba.njit(cache=True, nogil=True)(function))
+
+
+def inlined(function: Function) -> Function:
+    """Compile a function into each kernel that calls it; called from Python it stays what it is."""
+    made: Function = register_jitable(inline="always")(function)
+    return made

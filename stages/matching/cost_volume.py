@@ -5,6 +5,9 @@ addition, a ReLU, conv3 and the head. A cell whose right pixel lies outside the 
 it is NaN, and can never win. Lower is better; ``1 / (1 + exp(-cost))`` is the probability of a mismatch.
 """
 
+from collections.abc import Callable
+from itertools import product
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -13,13 +16,17 @@ from torch.nn import functional
 
 from stages.allocator import keep_freed_memory
 from stages.matching.declaration import RADIUS, CostVolumeParams
-from stages.matching.net import MatchingNet, net_from_parameters
+from stages.matching.net import SIDES, MatchingNet, net_from_parameters
+from stages.matching.winograd import TILE, TransformedNet
 from stages.precision import Precision, autocast
 from stages.stage import Inputs, StageError, require_shape
 from stages.training import one_thread
 
-COLUMNS = 192
-"""Columns computed at once: small enough for the joined maps to stay in the processor's cache."""
+ROWS, COLUMNS = 32, 64
+"""Cells computed at once: few enough for all that is in between to stay in the processor's cache."""
+
+Costs = Callable[[int, int, int, int], NDArray[np.float32]]
+"""``costs(y, x, columns, disparity)``: of at most ROWS rows, fewer at the bottom, from a cell on."""
 
 
 def valid_columns(disparity: int, width: int) -> tuple[int, int]:
@@ -67,31 +74,56 @@ def padded_cost_volume(
     if channels.shape[:2] != (2, net.channels):
         raise StageError(f"matching-Net expects 2 views of {net.channels} channels, got {channels.shape[:2]}")
     height, width = (length - 2 * RADIUS for length in channels.shape[2:])
-    volume = np.full((len(disparities), height, width), np.nan, np.float32)
+    volume = np.full((height, width, len(disparities)), np.nan, np.float32)
     keep_freed_memory()
     one_thread()
     with torch.inference_mode(), autocast(precision):
-        left, right = _embedded(net, channels)
-        for index, disparity in enumerate(disparities):
-            first, end = valid_columns(disparity, width)
-            for start in range(first, end, COLUMNS):
-                stop = min(start + COLUMNS, end)
-                volume[index, :, start:stop] = _costs(net, left, right, disparity, start, stop)
-    return np.ascontiguousarray(volume.transpose(1, 2, 0))
+        views = torch.from_numpy(np.ascontiguousarray(channels))
+        transformed = precision == "float32" and net.head == "compact"
+        costs = _transformed(net, views) if transformed else _direct(net, views)
+        # Disparities go innermost: a block of the left view, and what it meets in the right, stay in the cache.
+        for y, block in product(range(0, height, ROWS), range(0, width, COLUMNS)):
+            for index, disparity in enumerate(disparities):
+                first, end = valid_columns(disparity, width)
+                start, stop = max(block, first), min(block + COLUMNS, end)
+                if start < stop:
+                    volume[y : y + ROWS, start:stop, index] = costs(y, start, stop - start, disparity)
+    return volume
 
 
-def _embedded(net: MatchingNet, channels: NDArray[np.float32]) -> tuple[Tensor, Tensor]:
-    views = torch.from_numpy(np.ascontiguousarray(channels))
-    left = net.embed(views[:1], "left").contiguous(memory_format=torch.channels_last)
-    right = net.embed(views[1:], "right").contiguous(memory_format=torch.channels_last)
-    return left, right
-
-
-def _costs(net: MatchingNet, left: Tensor, right: Tensor, disparity: int, start: int, stop: int) -> NDArray[np.float32]:
-    """Return the costs (y, x) of columns start..stop at one disparity."""
+def _direct(net: MatchingNet, views: Tensor) -> Costs:
+    """Return costs by the network's own convolutions, in whichever precision it runs."""
+    left, right = (
+        net.embed(view[None], side).contiguous(memory_format=torch.channels_last)
+        for view, side in zip(views, SIDES, strict=True)
+    )
     reach = 2 * RADIUS - 4  # what conv3 and the head still take from each side together
-    joined = functional.relu(left[..., start : stop + reach] + right[..., start - disparity : stop - disparity + reach])
-    costs: NDArray[np.float32] = net.log_odds(joined)[0].numpy()
+
+    def costs(y: int, x: int, columns: int, disparity: int) -> NDArray[np.float32]:
+        rows = slice(y, y + ROWS + reach)
+        one = left[..., rows, x : x + columns + reach]
+        other = right[..., rows, x - disparity : x - disparity + columns + reach]
+        made: NDArray[np.float32] = net.log_odds(functional.relu(one + other))[0].numpy()
+        return made
+
+    return costs
+
+
+def _transformed(net: MatchingNet, views: Tensor) -> Costs:
+    """Return costs by transformed convolutions: the same numbers in float32, in a third of the time."""
+    height = views.shape[2] - 2 * RADIUS
+    transformed = TransformedNet.of(net)
+    left, right = (
+        # y and x last but one: the filters of a pixel lie side by side. The last tile may reach over the edge.
+        functional.pad(net.embed_layers(view[None], side).permute(0, 2, 3, 1), (0, 0, 0, TILE, 0, TILE)).numpy()
+        for view, side in zip(views, SIDES, strict=True)
+    )
+
+    def costs(y: int, x: int, columns: int, disparity: int) -> NDArray[np.float32]:
+        rows = min(ROWS, height - y)
+        tiles = -(-rows // TILE), -(-columns // TILE)
+        return transformed.log_odds(left, right, (y, x, x - disparity), tiles)[:rows, :columns]
+
     return costs
 
 

@@ -31,6 +31,8 @@ from stages.parameters import count, from_vector
 from stages.precision import autocast
 from stages.stage import StageError
 
+Side = Literal["left", "right"]
+SIDES: tuple[Side, Side] = ("left", "right")
 HEADS: tuple[Head, ...] = ("compact", "paper")
 
 
@@ -49,7 +51,7 @@ class MatchingNet(nn.Module):
         super().__init__()
         if channels < 1:
             raise StageError(f"matching-Net needs at least one channel, got {channels}")
-        self.channels = channels
+        self.channels, self.head = channels, head
         # The channels' scales differ by an order of magnitude and conv1 is shared between them, so the
         # net itself brings them to one scale: fixed numbers of the training set, never of the image at hand.
         self.register_buffer("input_mean", torch.zeros(channels))
@@ -61,7 +63,7 @@ class MatchingNet(nn.Module):
         self.hidden = nn.ModuleList(_hidden_layers(head))
         self.out = nn.Conv2d(128, 2, 1)
 
-    def embed(self, view: Tensor, side: Literal["left", "right"]) -> Tensor:
+    def embed(self, view: Tensor, side: Side) -> Tensor:
         """Return one view's share of conv2, before the ReLU.
 
         Args:
@@ -72,11 +74,16 @@ class MatchingNet(nn.Module):
             (B, channels * 128, H - 4, W - 4); the 128 filters of channel k are contiguous.
         """
         batch, _, height, width = view.shape
+        return self.embed_layers(view, side).reshape(batch, self.channels * 128, height - 4, width - 4)
+
+    def embed_layers(self, view: Tensor, side: Side) -> Tensor:
+        """As ``embed``, with each channel on its own: (B * channels, 128, H - 4, W - 4)."""
+        batch, _, height, width = view.shape
         conv2 = self.conv2_left if side == "left" else self.conv2_right
         scaled = (view - self.input_mean[:, None, None]) / self.input_std[:, None, None]
         layers = scaled.to(self.conv1.weight.dtype).reshape(batch * self.channels, 1, height, width)
-        maps: Tensor = conv2(functional.relu(self.conv1(layers)))  # B*l 128 H-4 W-4
-        return maps.reshape(batch, self.channels * 128, height - 4, width - 4)
+        maps: Tensor = conv2(functional.relu(self.conv1(layers)))
+        return maps
 
     def describe(self, joined: Tensor) -> Tensor:
         """Return the 128 features before the output layer.
