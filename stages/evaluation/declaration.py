@@ -19,7 +19,7 @@ class EvaluationSamplesParams(Params):
     """What the evaluation-Net learns from."""
 
     form: Literal["strided", "patch"] = Field("strided", description="grids of pixels, or the paper's single pixels")
-    samples: int = Field(12000, ge=1, description="grids in all, over the scenes in equal parts (strided)")
+    samples: int = Field(16000, ge=1, description="grids in all, over the scenes in equal parts (strided)")
     rows: int = Field(12, ge=1, le=64, description="rows of a grid, 16 px apart (strided)")
     columns: int = Field(16, ge=1, le=64, description="columns of a grid, 16 px apart (strided)")
     tolerance: float = Field(1.0, gt=0, description="T_e: largest error of a disparity that counts as right, px")
@@ -29,7 +29,7 @@ class EvaluationSamplesParams(Params):
 class EvaluationNetParams(Schedule):
     """The evaluation-Net and how it is trained."""
 
-    steps: int = Field(1500, ge=1, description="optimiser steps")
+    steps: int = Field(2000, ge=1, description="optimiser steps")
     first_rate: float = Field(0.001, gt=0, description="learning rate of the first step")
     batch: int = Field(
         8, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"

@@ -17,7 +17,8 @@ from torch.nn import functional
 from stages.allocator import keep_freed_memory
 from stages.matching.declaration import RADIUS, CostVolumeParams
 from stages.matching.net import SIDES, MatchingNet, net_from_parameters
-from stages.matching.winograd import TILE, TransformedNet
+from stages.matching.transformed import TransformedNet, is_transformable, run_block
+from stages.matching.winograd import TILE
 from stages.precision import Precision, autocast
 from stages.stage import Inputs, StageError, require_shape
 from stages.training import one_thread
@@ -79,8 +80,7 @@ def padded_cost_volume(
     one_thread()
     with torch.inference_mode(), autocast(precision):
         views = torch.from_numpy(np.ascontiguousarray(channels))
-        transformed = precision == "float32" and net.head == "compact"
-        costs = _transformed(net, views) if transformed else _direct(net, views)
+        costs = _transformed(net, views) if is_transformable(net, precision) else _direct(net, views)
         # Disparities go innermost: a block of the left view, and what it meets in the right, stay in the cache.
         for y, block in product(range(0, height, ROWS), range(0, width, COLUMNS)):
             for index, disparity in enumerate(disparities):
@@ -114,15 +114,17 @@ def _transformed(net: MatchingNet, views: Tensor) -> Costs:
     height = views.shape[2] - 2 * RADIUS
     transformed = TransformedNet.of(net)
     left, right = (
-        # y and x last but one: the filters of a pixel lie side by side. The last tile may reach over the edge.
-        functional.pad(net.embed_layers(view[None], side).permute(0, 2, 3, 1), (0, 0, 0, TILE, 0, TILE)).numpy()
+        # The filters of a pixel lie side by side; the last tile may reach over the edge.
+        functional.pad(net.embed_layers(view[None], side).permute(0, 2, 3, 1), (0, 0, 0, TILE, 0, TILE))
         for view, side in zip(views, SIDES, strict=True)
     )
 
     def costs(y: int, x: int, columns: int, disparity: int) -> NDArray[np.float32]:
         rows = min(ROWS, height - y)
-        tiles = -(-rows // TILE), -(-columns // TILE)
-        return transformed.log_odds(left, right, (y, x, x - disparity), tiles)[:rows, :columns]
+        shape = -(-rows // TILE), -(-columns // TILE)
+        block = run_block(transformed, left, right, (y, x, x - disparity), shape)
+        made: NDArray[np.float32] = net.odds_of_features(block.units)[:rows, :columns].numpy()
+        return made
 
     return costs
 

@@ -19,10 +19,10 @@ class MatchingSamplesParams(Params):
     """What the matching-Net learns from."""
 
     form: Form = Field("dense", description="dense crops, or the paper's patches")
-    samples: int = Field(7200, ge=1, description="samples in all, over the scenes in equal parts")
-    height: int = Field(24, ge=1, le=256, description="rows of a dense crop, px")
-    width: int = Field(40, ge=1, le=256, description="columns of a dense crop, px")
-    slots: int = Field(8, ge=3, le=64, description="disparities a dense crop is compared at")
+    samples: int = Field(8000, ge=1, description="samples in all, over the scenes in equal parts")
+    height: int = Field(16, ge=1, le=256, description="rows of a dense crop, px")
+    width: int = Field(32, ge=1, le=256, description="columns of a dense crop, px")
+    slots: int = Field(96, ge=3, le=512, description="most disparities a dense crop is compared at")
     mirror: bool = Field(True, description="mirror half of the samples where the right view has a truth")
     seed: int = Field(0, ge=0, description="seed of the draw")
 
@@ -40,11 +40,12 @@ class MatchingSamplesParams(Params):
 class MatchingNetParams(Schedule):
     """The matching-Net and how it is trained."""
 
-    steps: int = Field(1200, ge=1, description="optimiser steps")
+    steps: int = Field(2000, ge=1, description="optimiser steps")
     head: Head = Field("compact", description="hidden layers: 128 units, or the paper's 1600 and 128")
     batch: int = Field(
-        6, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"
+        4, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"
     )
+    ranking: float = Field(1.0, ge=0, description="weight of the ranking loss; 0: none, as the paper")
     relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting a view; 0: none, as the paper")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
     seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
@@ -83,7 +84,9 @@ MATCHING_SAMPLES = Stage(
         Output("mirrored", ("sample",), "bool", "1", "views flipped and exchanged"),
         Output("y", ("sample",), "int32", "px", "top row of the crop"),
         Output("x", ("sample",), "int32", "px", "left column of the crop"),
-        Output("disparities", ("sample", "slot"), "int32", "px", "disparities the crop is compared at"),
+        Output(
+            "disparities", ("sample", "slot"), "int32", "px", "disparities the crop is compared at, then -2147483648"
+        ),
         Output("truth", ("sample", "row", "column"), "float32", "px", "true disparity where both views see the pixel"),
     ),
     compute="stages.matching.samples:draw_samples",
@@ -96,7 +99,7 @@ MATCHING_NET = Stage(
     inputs=("matching_samples", "channels"),
     outputs=(
         Output("parameters", ("parameter",), "float32", "1", "weights and channel scales of the matching-Net"),
-        Output("loss", ("step",), "float32", "1", "class-balanced cross-entropy of each training step"),
+        Output("loss", ("step",), "float32", "1", "loss of each training step"),
     ),
     compute="stages.matching.train:train_matching_net",
     params=MatchingNetParams,

@@ -114,11 +114,19 @@ class MatchingNet(nn.Module):
         The difference of the two outputs is one filter. It is applied in float32 whatever the
         precision of the rest: bfloat16's 8 bits would make ties of neighbouring costs.
         """
-        weight = (self.out.weight[1] - self.out.weight[0]).float().reshape(128)
-        bias = self._output_bias()
         features = self.describe(joined)
-        with autocast("float32"):  # einsum is a product of matrices, which autocast would bring back to bfloat16
-            return torch.einsum("bchw,c->bhw", features.float(), weight) + bias
+        with autocast("float32"):  # or autocast would bring the product back to bfloat16
+            return self.odds_of_features(features.float().permute(0, 2, 3, 1))
+
+    def logits_of_features(self, features: Tensor) -> Tensor:
+        """Return the logits from the features before the output layer: (B, H, W, 128) -> (B, 2, H, W)."""
+        logits: Tensor = functional.linear(features, self.out.weight[:, :, 0, 0], self.out.bias)
+        return logits.permute(0, 3, 1, 2)
+
+    def odds_of_features(self, features: Tensor) -> Tensor:
+        """Return the log-odds of a mismatch from the features before the output layer: (..., 128) -> (...)."""
+        weight = (self.out.weight[1] - self.out.weight[0]).float().reshape(128)
+        return features @ weight + self._output_bias()
 
     def _output_bias(self) -> Tensor:
         if self.out.bias is None:

@@ -6,8 +6,9 @@ within 0.5 px of it a match, more than 1 px away a mismatch, between them nothin
 
 * ``patch``, the paper's: a crop of one pixel with two disparities, the nearest to the truth and a
   random other one more than 1 px away.
-* ``dense``: a larger crop; some disparities are those of pixels in the crop (so that there are
-  matches), some lie just beside them (the mismatches that are hardest to tell), the rest anywhere.
+* ``dense``: a larger crop at every disparity of the scene's range, as the winner will be taken from. Of a
+  range too large for the slots, some are disparities of pixels in the crop (so that there are matches), some
+  lie just beside them (the mismatches that are hardest to tell), the rest anywhere.
 
 Where the right view has ground truth, half the samples are *mirrored*: both views flipped and
 exchanged, which is again a rectified pair.
@@ -24,6 +25,8 @@ from stages.stage import Arrays, Inputs, StageError, by_scene
 
 NEAR = 6
 """Largest distance from the truth, in pixels, of a mismatch that is drawn beside it."""
+ABSENT = np.iinfo(np.int32).min
+"""Fills the slots of a sample that has fewer disparities than the others."""
 
 
 def visible_truth(truth: Arrays, mirrored: bool) -> NDArray[np.float32]:
@@ -41,8 +44,8 @@ def draw_samples(params: MatchingSamplesParams, inputs: Inputs) -> dict[str, NDA
 
     Returns:
         ``scene`` int32, ``mirrored`` bool, ``y`` and ``x`` int32 (sample,): the crop's top left pixel;
-        ``disparities`` int32 (sample, slot), px; ``truth`` float32 (sample, row, column), px, NaN where
-        a cell teaches nothing.
+        ``disparities`` int32 (sample, slot), px, distinct, then ``ABSENT``; ``truth`` float32 (sample, row, column),
+        px, NaN where a cell teaches nothing.
 
     Raises:
         StageError: if a crop does not fit into a scene, or a scene has no pixel to learn from.
@@ -141,11 +144,14 @@ def _patch_slots(
 def _dense_slots(
     known: NDArray[np.float32], low: int, high: int, count: int, rng: np.random.Generator
 ) -> NDArray[np.int64]:
-    """Return a third of disparities found in the crop, a sixth beside such ones, the rest from the whole range."""
-    found = np.rint(rng.choice(known, count // 3))
-    beside = np.rint(rng.choice(known, count // 6)) + rng.choice((-1, 1), count // 6) * rng.integers(
-        2, NEAR + 1, count // 6
-    )
-    anywhere = rng.integers(low, high + 1, count - len(found) - len(beside))
-    slots: NDArray[np.int64] = np.clip(np.concatenate([found, beside, anywhere]), low, high).astype(np.int64)
-    return slots
+    """Return the whole range, then ``ABSENT``; of a larger one first disparities of the crop and beside such ones."""
+    slots = np.arange(low, high + 1)
+    if len(slots) > count:
+        found = np.rint(rng.choice(known, count // 3))
+        beside = np.rint(rng.choice(known, count // 6)) + rng.choice((-1, 1), count // 6) * rng.integers(
+            2, NEAR + 1, count // 6
+        )
+        wanted = np.clip(np.concatenate([found, beside, rng.permutation(slots)]), low, high).astype(np.int64)
+        _, first = np.unique(wanted, return_index=True)
+        slots = wanted[np.sort(first)[:count]]
+    return np.pad(slots, (0, count - len(slots)), constant_values=ABSENT)

@@ -1,8 +1,12 @@
 """Training the matching-Net on crops or patches of the training scenes.
 
-The two forms of samples are the same objective: cross-entropy with both classes of equal weight.
-``dense`` computes conv1 and conv2 once a crop and compares it at several disparities, which is over
+The paper's objective is the cross-entropy of match and mismatch, both classes weighing the same, in either form
+of samples: ``dense`` computes conv1 and conv2 once a crop and compares it at all disparities, which is over
 a hundred times the samples a second of the paper's way.
+
+That loss judges each cell alone, while the winner is taken among the cells of a pixel, and after some hundred
+steps nearly all mismatches are told easily. The *ranking loss* adds what is left to learn: the negative log of
+the match's share in the softmax over a pixel's disparities, whose gradient goes to the mismatches that rival it.
 """
 
 from collections.abc import Sequence
@@ -12,12 +16,17 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+from torch.nn import functional
 
 from stages.augmentation import relight
 from stages.matching.declaration import RADIUS, MatchingNetParams
-from stages.matching.net import MatchingNet
+from stages.matching.net import SIDES, MatchingNet
+from stages.matching.samples import ABSENT
+from stages.matching.transformed import TransformedNet, is_transformable
+from stages.matching.transformed_training import joined_units
+from stages.matching.winograd import TILE
 from stages.parameters import initialise, to_vector
-from stages.precision import autocast
+from stages.precision import Precision, autocast
 from stages.schedule import SHARDS
 from stages.stage import Arrays, Inputs, Monitor, Silent, by_scene
 from stages.training import balanced_cross_entropy, fit
@@ -51,7 +60,7 @@ def train_matching_net(
         chosen = range(first, (step + 1) * params.batch, SHARDS)
         crops = [cut_crop(samples, index % len(samples["scene"]), scenes, params.relight, rng) for index in chosen]
         with autocast(params.precision):
-            return balanced_loss(net, crops)
+            return crops_loss(net, crops, params.ranking, params.precision)
 
     curve = fit(net, loss, params, monitor or Silent())
     return {"parameters": to_vector(net), "loss": curve}
@@ -95,6 +104,7 @@ def cut_crop(
     if samples["mirrored"][index]:
         views = views[::-1, :, :, ::-1]
     truth, slots = samples["truth"][index], samples["disparities"][index]
+    slots = slots[slots != ABSENT]
     y, x = int(samples["y"][index]), int(samples["x"][index])
     rows = np.arange(y - RADIUS, y + truth.shape[0] + RADIUS)
     columns = np.arange(x - RADIUS, x + truth.shape[1] + RADIUS)
@@ -136,15 +146,51 @@ def label_cells(truth: NDArray[np.float32], slots: NDArray[np.int32], x: int, wi
     return labels
 
 
-def balanced_loss(net: MatchingNet, crops: Sequence[Crop]) -> Tensor:
-    """Return the cross-entropy of all cells of the crops, matches and mismatches weighing the same."""
-    logits = torch.cat([_logits(net, crop).permute(1, 0, 2, 3).reshape(2, -1) for crop in crops], 1)
-    labels = torch.cat([crop.labels.reshape(-1) for crop in crops])
-    return balanced_cross_entropy(logits, labels)
+def crops_loss(net: MatchingNet, crops: Sequence[Crop], ranking: float, precision: Precision = "float32") -> Tensor:
+    """Return the class-balanced cross-entropy of all cells of the crops, plus ``ranking`` times their ranking loss."""
+    transformed = TransformedNet.of(net) if is_transformable(net, precision) else None
+    logits = [_logits(net, transformed, crop).float() for crop in crops]
+    labels = [crop.labels for crop in crops]
+    cells = torch.cat([each.permute(1, 0, 2, 3).reshape(2, -1) for each in logits], 1)
+    total = balanced_cross_entropy(cells, torch.cat([each.reshape(-1) for each in labels]))
+    return total + ranking * ranking_loss(logits, labels) if ranking else total
 
 
-def _logits(net: MatchingNet, crop: Crop) -> Tensor:
+def ranking_loss(logits: Sequence[Tensor], labels: Sequence[Tensor]) -> Tensor:
+    """Return the mean over pixels of ``-log(sum over matches of e^s / sum over labelled cells of e^s)``.
+
+    ``s`` is the log-odds of a match. A pixel without a match or without a mismatch teaches nothing; without
+    any other pixel the loss is 0.
+
+    Args:
+        logits: of each crop (slot, 2, y, x).
+        labels: of each crop int64 (slot, y, x): 0 match, 1 mismatch, ``IGNORED``.
+    """
+    losses = [logits[0].sum() * 0]
+    for given, label in zip(logits, labels, strict=True):
+        taught = (label == 0).any(0) & (label == 1).any(0)
+        score, kind = (given[:, 0] - given[:, 1])[:, taught], label[:, taught]  # slot pixel
+        matches = score.masked_fill(kind != 0, -torch.inf).logsumexp(0)
+        losses.append((score.masked_fill(kind == IGNORED, -torch.inf).logsumexp(0) - matches).reshape(-1))
+    values = torch.cat([losses[0].reshape(1), *losses[1:]])
+    return values.sum() / max(len(values) - 1, 1)
+
+
+def _logits(net: MatchingNet, transformed: TransformedNet | None, crop: Crop) -> Tensor:
     """Return the logits (slot, 2, h, w) of a crop at each of its disparities."""
+    height, width = crop.labels.shape[1:]
+    if transformed is None or min(height, width) < TILE:  # of a tile, a patch would use one cell
+        return _direct_logits(net, crop)
+    left, strip = (
+        # The filters of a pixel lie side by side, and the crop is made up to whole tiles.
+        functional.pad(net.embed_layers(view, side).permute(0, 2, 3, 1), (0, 0, 0, -width % TILE, 0, -height % TILE))
+        for view, side in ((crop.left, SIDES[0]), (crop.strip, SIDES[1]))
+    )
+    units = joined_units(left.contiguous(), strip.contiguous(), [int(start) for start in crop.starts], transformed)
+    return net.logits_of_features(units[:, :height, :width])
+
+
+def _direct_logits(net: MatchingNet, crop: Crop) -> Tensor:
     left = net.embed(crop.left, "left")
     strip = net.embed(crop.strip, "right")
     pieces: tuple[Tensor, ...] = _Windows.apply(  # type: ignore[no-untyped-call]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from stages.matching.declaration import MATCHING_SAMPLES, MatchingSamplesParams
-from stages.matching.samples import draw_samples, visible_truth
+from stages.matching.samples import ABSENT, draw_samples, visible_truth
 from stages.matching.train import IGNORED, cut_crop, label_cells
 from stages.stage import StageError
 from tests.stages.matching.reference import shifted_scene
@@ -81,17 +81,30 @@ def test_a_patch_has_one_match_and_one_mismatch() -> None:
     assert made["disparities"].min() >= low and made["disparities"].max() <= high
 
 
-def test_a_dense_crop_has_matches_near_misses_and_others() -> None:
-    made = draw_samples(MatchingSamplesParams(samples=80, height=6, width=10, slots=12), truths())
+def test_a_dense_crop_is_compared_at_the_whole_range() -> None:
+    made = draw_samples(MatchingSamplesParams(samples=20, height=6, width=10, slots=20), truths())
     low, high = shifted_scene()["truth"]["range"]
-    assert made["disparities"].min() >= low and made["disparities"].max() <= high
+    count = high - low + 1
+    assert count < 20
+    assert (made["disparities"][:, :count] == np.arange(low, high + 1)).all()
+    assert (made["disparities"][:, count:] == ABSENT).all()
+
+
+def test_of_a_larger_range_come_matches_near_misses_and_others() -> None:
+    scene = shifted_scene()
+    scene["truth"]["range"] = np.array([-20, 60])
+    made = draw_samples(MatchingSamplesParams(samples=80, height=6, width=10, slots=12), truths(scene))
+    assert made["disparities"].min() < -10 and made["disparities"].max() > 50, "anywhere in the range"
+    beside = 0
     for index in range(80):
-        error = np.abs(made["disparities"][index][:, None, None] - made["truth"][index])
-        least = np.nanmin(error, axis=(1, 2))
-        assert (least[:4] == 0).all(), "a third are disparities of the crop"
-        assert ((least[4:6] <= 6) | np.isin(made["disparities"][index][4:6], (low, high))).all(), "a sixth lie near"
+        slots = made["disparities"][index]
+        assert len(np.unique(slots)) == 12 and slots.min() >= -20 and slots.max() <= 60
+        least = np.nanmin(np.abs(slots[:, None, None] - made["truth"][index]), axis=(1, 2))
+        assert least[0] == 0, "first disparities of the crop"
+        beside += ((least >= 2) & (least <= 6)).sum()
         found = labels(made, index)
         assert (found == 0).any() and (found == 1).any()
+    assert beside >= 2 * 80, "a sixth lie near them"
 
 
 def test_only_pixels_seen_in_both_views_teach() -> None:
@@ -175,9 +188,9 @@ def narrow_range() -> dict[str, dict]:
     ("params", "scene", "message"),
     [
         pytest.param(
-            {"height": 31}, shifted_scene(), r"crop of \(31, 40\) px does not fit .* \(30, 64\) px", id="tall"
+            {"height": 31}, shifted_scene(), r"crop of \(31, 32\) px does not fit .* \(30, 64\) px", id="tall"
         ),
-        pytest.param({"width": 65}, shifted_scene(), r"crop of \(24, 65\) px does not fit", id="wide"),
+        pytest.param({"width": 65}, shifted_scene(), r"crop of \(16, 65\) px does not fit", id="wide"),
         pytest.param(
             {"mirror": False}, blind_scene(), "no pixel with a known disparity that both views see", id="blind"
         ),

@@ -6,7 +6,15 @@ from stages.matching.cost_volume import cost_volume
 from stages.matching.declaration import MATCHING_NET, MatchingNetParams, MatchingSamplesParams
 from stages.matching.net import net_from_parameters
 from stages.matching.samples import draw_samples
-from stages.matching.train import IGNORED, Crop, balanced_loss, cut_crop, label_cells, train_matching_net
+from stages.matching.train import (
+    IGNORED,
+    Crop,
+    crops_loss,
+    cut_crop,
+    label_cells,
+    ranking_loss,
+    train_matching_net,
+)
 from tests.stages.matching.reference import literal_logits, patches, random_net, shifted_scene
 from tests.stages.monitors import InterruptedTrainingError, Memory
 
@@ -67,7 +75,7 @@ def test_the_loss_is_that_of_the_patches() -> None:
             labels.append(int(crop.labels[slot, row, column]))
     losses = torch.nn.functional.cross_entropy(torch.cat(logits), torch.tensor(labels), reduction="none").numpy()
     means = [losses[np.array(labels) == label].mean() for label in (0, 1)]
-    assert balanced_loss(net, crops(given, 6)).item() == pytest.approx(np.mean(means), abs=1e-4)
+    assert crops_loss(net, crops(given, 6), 0.0).item() == pytest.approx(np.mean(means), abs=1e-4)
 
 
 def test_a_dense_crop_of_one_pixel_teaches_what_a_patch_does() -> None:
@@ -78,7 +86,7 @@ def test_a_dense_crop_of_one_pixel_teaches_what_a_patch_does() -> None:
     dense = [cut_crop(wide, index, views, 0.0, np.random.default_rng(0)) for index in range(9)]
     for crop in dense:
         crop.labels[2] = IGNORED
-    losses = [balanced_loss(net, many) for many in (crops(given, 9), dense)]
+    losses = [crops_loss(net, many, 0.0) for many in (crops(given, 9), dense)]
     gradients = [torch.autograd.grad(loss, list(net.parameters())) for loss in losses]
     assert losses[0].item() == pytest.approx(losses[1].item(), abs=1e-6)
     for one, other in zip(*gradients, strict=True):
@@ -94,10 +102,64 @@ def test_the_gradients_are_those_of_plain_windows() -> None:
     labels = crop.labels.reshape(-1)
     weight = 0.5 / torch.stack([(labels == label).sum() for label in (0, 1)]).clamp(min=1)
     plain = torch.nn.functional.cross_entropy(logits.T, labels, weight, ignore_index=IGNORED, reduction="sum")
-    made = balanced_loss(net, [crop])
+    made = crops_loss(net, [crop], 0.0)
     assert made.item() == pytest.approx(plain.item(), abs=1e-5)
     for one, other in zip(*(torch.autograd.grad(loss, list(net.parameters())) for loss in (made, plain)), strict=True):
         assert (one - other).abs().max() <= 1e-4 * max(1.0, float(other.abs().max()))
+
+
+def test_the_ranking_loss_by_hand() -> None:
+    """Odds of a match 2, 1, 0 and 3 at four disparities; the match is the first, the last teaches nothing."""
+    logits = torch.zeros(4, 2, 1, 3)
+    logits[:, 0] = torch.tensor([2.0, 1.0, 0.0, 3.0])[:, None, None]
+    labels = torch.tensor([0, 1, 1, IGNORED])[:, None, None].repeat(1, 1, 3)
+    labels[:, 0, 1] = torch.tensor([1, 1, 1, 1])  # no match
+    labels[:, 0, 2] = torch.tensor([0, 0, IGNORED, IGNORED])  # no mismatch
+    expected = np.log(np.exp(2) + np.exp(1) + np.exp(0)) - 2
+    assert ranking_loss([logits], [labels]).item() == pytest.approx(expected, abs=1e-6)
+    other = logits.clone()
+    other[:, 0] = torch.tensor([0.0, 0.0, 2.0, 0.0])[:, None, None]
+    both = ranking_loss([logits, other], [labels, labels]).item()
+    assert both == pytest.approx((expected + np.log(2 + np.exp(2))) / 2, abs=1e-6), "a mean over pixels, not over crops"
+
+
+def test_nothing_to_rank_is_no_loss() -> None:
+    logits = torch.zeros(2, 2, 1, 1, requires_grad=True)
+    loss = ranking_loss([logits], [torch.full((2, 1, 1), IGNORED)])
+    assert loss.item() == 0
+    assert torch.equal(torch.autograd.grad(loss, logits)[0], torch.zeros_like(logits))
+
+
+def test_the_ranking_loss_is_added_by_its_weight() -> None:
+    net, some = random_net(), crops(inputs(), 4)
+    none, one, three = (crops_loss(net, some, weight).item() for weight in (0.0, 1.0, 3.0))
+    assert one > none
+    assert three - none == pytest.approx(3 * (one - none), rel=1e-4)
+
+
+@pytest.mark.parametrize("size", [pytest.param((8, 12), id="whole tiles"), pytest.param((5, 7), id="parts of tiles")])
+def test_the_gradients_do_not_depend_on_the_way_of_computing(size: tuple[int, int]) -> None:
+    """Transformed and direct convolutions; biases keep every ReLU open, since a cut may fall on either side of 0."""
+    net, some = random_net(), crops(inputs(height=size[0], width=size[1], slots=5), 2)
+    with torch.no_grad():
+        for layer in (net.conv1, net.conv2_left, net.conv3, net.hidden[0]):
+            layer.weight *= 0.1
+            layer.bias += 1.0
+        net.out.weight *= 0.1
+    losses = [crops_loss(net, some, 1.0), crops_loss(net, some, 1.0, "bfloat16")]  # no autocast: float32, but direct
+    assert losses[0].item() == pytest.approx(losses[1].item(), rel=1e-5)
+    for one, other in zip(*(torch.autograd.grad(loss, list(net.parameters())) for loss in losses), strict=True):
+        assert (one - other).abs().max() <= 1e-4 * float(other.abs().max())
+
+
+def test_transformed_gradients_are_cut_where_direct_ones_are() -> None:
+    """With ReLUs at work: a few fall on the other side of 0, which no one can tell apart."""
+    net, some = random_net(), crops(inputs(height=8, width=12, slots=5), 2)
+    gradients = [
+        torch.autograd.grad(crops_loss(net, some, 1.0, how), list(net.parameters())) for how in ("float32", "bfloat16")
+    ]
+    for one, other in zip(*gradients, strict=True):
+        assert (one - other).norm() <= 0.01 * other.norm()
 
 
 def test_beyond_the_image_comes_its_nearest_pixel() -> None:
@@ -144,7 +206,8 @@ def test_makes_what_it_declares_and_one_seed_makes_it_again() -> None:
 
 
 def test_the_first_loss_is_that_of_a_coin() -> None:
-    assert train_matching_net(settings(steps=1), inputs())["loss"][0] == pytest.approx(np.log(2), abs=0.1)
+    made = train_matching_net(settings(steps=1, ranking=0.0), inputs())
+    assert made["loss"][0] == pytest.approx(np.log(2), abs=0.1)
 
 
 def test_the_net_knows_the_scales_of_the_training_channels() -> None:

@@ -1,0 +1,43 @@
+import numpy as np
+import pytest
+import torch
+
+from stages.matching.net import SIDES
+from stages.matching.transformed import TransformedNet, is_transformable, run_block
+from stages.matching.winograd import TILE
+from tests.stages.matching.reference import random_net
+
+
+@pytest.mark.parametrize(
+    ("channels", "tiles", "corners"),
+    [
+        pytest.param(1, (1, 1), (0, 0, 0), id="one tile, one channel"),
+        pytest.param(3, (2, 3), (0, 0, 0), id="from the corner"),
+        pytest.param(3, (1, 2), (3, 5, 2), id="from elsewhere, shifted to the left"),
+        pytest.param(2, (2, 1), (1, 0, 6), id="shifted to the right"),
+    ],
+)
+def test_equals_the_direct_convolutions(channels: int, tiles: tuple[int, int], corners: tuple[int, int, int]) -> None:
+    """Against the network itself in float64; the direct way in float32 errs too."""
+    net = random_net(channels)
+    views = torch.from_numpy(np.random.default_rng(1).normal(size=(2, channels, 26, 32)).astype(np.float32))
+    with torch.inference_mode():
+        maps = [net.embed_layers(view[None], side) for view, side in zip(views, SIDES, strict=True)]
+        left, right = (each.permute(0, 2, 3, 1).contiguous() for each in maps)
+        block = run_block(TransformedNet.of(net), left, right, corners, tiles)
+        made = net.odds_of_features(block.units)
+        rows, columns = (TILE * count + 6 for count in tiles)
+        y, *starts = corners
+        one, other = (
+            each.reshape(1, -1, *each.shape[2:])[..., y : y + rows, x : x + columns]
+            for each, x in zip(maps, starts, strict=True)
+        )
+        expected = net.double().join(one.double(), other.double())[0]
+    assert made.shape == (TILE * tiles[0], TILE * tiles[1]) and made.dtype == torch.float32
+    assert (made - (expected[1] - expected[0])).abs().max() <= 1e-4
+
+
+def test_only_the_compact_head_in_float32_is_transformed() -> None:
+    assert is_transformable(random_net(1), "float32")
+    assert not is_transformable(random_net(1), "bfloat16")
+    assert not is_transformable(random_net(1, "paper"), "float32")
