@@ -45,7 +45,7 @@ class MatchingNetParams(Schedule):
     batch: int = Field(
         4, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"
     )
-    ranking: float = Field(1.0, ge=0, description="weight of the ranking loss; 0: none, as the paper")
+    ranking: float = Field(4.0, ge=0, description="weight of the ranking loss; 0: none, as the paper")
     relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting a view; 0: none, as the paper")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
     seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
