@@ -3,13 +3,14 @@
 A block of cells at one disparity goes through
 
     join       add two embedded views, cut at zero, transform 6 x 6 tiles        (tile, 36, 128) a channel
-    product    with conv3's transformed kernels, summed over the channels         (tile, 36, 64)
+    product    with conv3's transformed kernels, summed over the channels         (36, tile, 64)
     features   transform back, add the bias, cut at zero                          (y, x, 64)
     split      transform 8 x 8 tiles                                              (tile, 64, 64)
-    product    with the hidden layer's transformed kernels                        (tile, 64, 128)
+    product    with the hidden layer's transformed kernels                        (64, tile, 128)
     units      transform back, add the bias, cut at zero                          (y, x, 128)
 
-Arrays of the kernels are flat, with the channels of a number side by side.
+What goes into a product is written tile by tile, while the tile is in the cache; what comes out of it lies as
+batched matrix products write fastest. The channels of a number are side by side in both.
 """
 
 from dataclasses import dataclass
@@ -26,10 +27,14 @@ from stages.matching.winograd import (
     Flat,
     forward6,
     forward8,
+    gather6,
+    gather8,
     inverse6,
     inverse8,
     load6,
     load8,
+    pick6,
+    pick8,
     spread,
     store4,
     store6,
@@ -89,14 +94,15 @@ def _join_row(one: Flat, other: Flat, out: Flat) -> None:
 
 
 @kernel
-def features(products: Flat, bias: Flat, shape: Shape, out: Flat) -> None:
-    """Transform conv3's products (tile, 36, FEATURES) back, add the bias, cut at zero: (4 y, 4 x, FEATURES)."""
+def features(products: NDArray[np.float32], bias: Flat, shape: Shape, out: Flat) -> None:
+    """Transform conv3's products (36, tile, FEATURES) back, add the bias, cut at zero: (4 y, 4 x, FEATURES)."""
     row = 6 * FEATURES
     part = np.empty(TILE * 6 * FEATURES, np.float32)
     for tile in range(shape[0] * shape[1]):
-        m = products[tile * 6 * row : (tile + 1) * 6 * row]
-        for c in range(6 * FEATURES):
-            store4(part, 6 * FEATURES, c, inverse6(load6(m, 6 * FEATURES, c)))
+        for j in range(6):
+            numbers, column = gather6(products, j, tile), part[j * FEATURES :]
+            for c in range(FEATURES):
+                store4(column, 6 * FEATURES, c, inverse6(pick6(numbers, c)))
         for k in range(TILE):
             line, pixels = part[k * row : (k + 1) * row], four_pixels(out, tile, k, shape, FEATURES)
             for c in range(FEATURES):
@@ -120,14 +126,15 @@ def split(given: Flat, shape: Shape, tiles: Flat) -> None:
 
 
 @kernel
-def units(products: Flat, bias: Flat, shape: Shape, out: Flat) -> None:
-    """Transform the hidden layer's products (tile, 64, UNITS) back, add the bias, cut at zero: (4 y, 4 x, UNITS)."""
+def units(products: NDArray[np.float32], bias: Flat, shape: Shape, out: Flat) -> None:
+    """Transform the hidden layer's products (64, tile, UNITS) back, add the bias, cut at zero: (4 y, 4 x, UNITS)."""
     row = 8 * UNITS
     part = np.empty(TILE * 8 * UNITS, np.float32)
     for tile in range(shape[0] * shape[1]):
-        m = products[tile * 8 * row : (tile + 1) * 8 * row]
-        for c in range(8 * UNITS):
-            store4(part, 8 * UNITS, c, inverse8(load8(m, 8 * UNITS, c)))
+        for j in range(8):
+            numbers, column = gather8(products, j, tile), part[j * UNITS :]
+            for c in range(UNITS):
+                store4(column, 8 * UNITS, c, inverse8(pick8(numbers, c)))
         for k in range(TILE):
             line, pixels = part[k * row : (k + 1) * row], four_pixels(out, tile, k, shape, UNITS)
             for c in range(UNITS):
@@ -203,17 +210,17 @@ def run_block(net: TransformedNet, left: Tensor, right: Tensor, corners: tuple[i
     """
     wide = shape[0] + 1, shape[1] + 1  # the hidden layer reaches 4 px on
     joined = torch.empty(wide[0] * wide[1], 36, JOINED)
-    products = torch.zeros(wide[0] * wide[1], 36, FEATURES)
+    products = torch.zeros(36, wide[0] * wide[1], FEATURES)
     for one, other, weight in zip(left, right, net.conv3, strict=True):
         join(one.numpy(), other.numpy(), corners, wide, flat(joined))
-        products.transpose(0, 1).baddbmm_(joined.transpose(0, 1), weight)
+        products.baddbmm_(joined.transpose(0, 1), weight)
     maps = torch.empty(TILE * wide[0], TILE * wide[1], FEATURES)
-    features(flat(products), net.conv3_bias.numpy(), wide, flat(maps))
-    tiles, answers = torch.empty(shape[0] * shape[1], 64, FEATURES), torch.empty(shape[0] * shape[1], 64, UNITS)
+    features(products.numpy(), net.conv3_bias.numpy(), wide, flat(maps))
+    tiles = torch.empty(shape[0] * shape[1], 64, FEATURES)
     split(flat(maps), shape, flat(tiles))
-    torch.bmm(tiles.transpose(0, 1), net.hidden, out=answers.transpose(0, 1))
+    answers = torch.bmm(tiles.transpose(0, 1), net.hidden)
     made = torch.empty(TILE * shape[0], TILE * shape[1], UNITS)
-    units(flat(answers), net.hidden_bias.numpy(), shape, flat(made))
+    units(answers.numpy(), net.hidden_bias.numpy(), shape, flat(made))
     return Block(maps, tiles, made)
 
 

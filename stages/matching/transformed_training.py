@@ -33,11 +33,15 @@ from stages.matching.winograd import (
     Flat,
     forward6_transposed,
     forward8_transposed,
+    gather6,
+    gather8,
     inverse6_transposed,
     inverse8_transposed,
     load4,
     load6,
     load8,
+    pick6,
+    pick8,
     store6,
     store8,
 )
@@ -59,14 +63,15 @@ def _units_transposed(gradient: Flat, shape: Shape, products: Flat) -> None:
 
 
 @kernel
-def _split_transposed(tiles: Flat, shape: Shape, gradient: Flat) -> None:
-    """Add up the gradients of tiles (tile, 64, FEATURES) in that of the features (4 y + 4, 4 x + 4, FEATURES)."""
+def _split_transposed(tiles: NDArray[np.float32], shape: Shape, gradient: Flat) -> None:
+    """Add up the gradients of tiles (64, tile, FEATURES) in that of the features (4 y + 4, 4 x + 4, FEATURES)."""
     row = 8 * FEATURES
     part = np.empty(8 * 8 * FEATURES, np.float32)
     for tile in range(shape[0] * shape[1]):
-        given = tiles[tile * 8 * row : (tile + 1) * 8 * row]
-        for c in range(8 * FEATURES):
-            store8(part, 8 * FEATURES, c, forward8_transposed(load8(given, 8 * FEATURES, c)))
+        for j in range(8):
+            numbers, column = gather8(tiles, j, tile), part[j * FEATURES :]
+            for c in range(FEATURES):
+                store8(column, 8 * FEATURES, c, forward8_transposed(pick8(numbers, c)))
         for k in range(8):
             place = eight_pixels(tile, k, shape)
             line, pixels = part[k * row : (k + 1) * row], gradient[place : place + row]
@@ -93,21 +98,22 @@ def _features_transposed(gradient: Flat, shape: Shape, products: Flat) -> None:
 
 @kernel
 def _join_transposed(
-    tiles: Flat,
+    tiles: NDArray[np.float32],
     views: tuple[NDArray[np.float32], NDArray[np.float32]],
     start: int,
     shape: Shape,
     gradients: tuple[NDArray[np.float32], NDArray[np.float32]],
 ) -> None:
-    """Add up the gradients of tiles (tile, 36, JOINED) in those of the two views of one channel (y, x, JOINED)."""
+    """Add up the gradients of tiles (36, tile, JOINED) in those of the two views of one channel (y, x, JOINED)."""
     row = 6 * JOINED
     part = np.empty(6 * 6 * JOINED, np.float32)
     left, right = views[0].reshape(-1), views[1].reshape(-1)
     left_gradient, right_gradient = gradients[0].reshape(-1), gradients[1].reshape(-1)
     for tile in range(shape[0] * shape[1]):
-        given = tiles[tile * 6 * row : (tile + 1) * 6 * row]
-        for c in range(6 * JOINED):
-            store6(part, 6 * JOINED, c, forward6_transposed(load6(given, 6 * JOINED, c)))
+        for j in range(6):
+            numbers, column = gather6(tiles, j, tile), part[j * JOINED :]
+            for c in range(JOINED):
+                store6(column, 6 * JOINED, c, forward6_transposed(pick6(numbers, c)))
         for k in range(6):
             y, x = tile // shape[1] * TILE + k, tile % shape[1] * TILE
             first = (y * views[0].shape[1] + x) * JOINED
@@ -184,10 +190,9 @@ def _products_gradient(net: TransformedNet, block: Block, given: Tensor, kernels
     answers = torch.empty(shape[0] * shape[1], 64, UNITS)
     _units_transposed(flat(cut), shape, flat(answers))
     hidden.baddbmm_(block.split.permute(1, 2, 0), answers.transpose(0, 1))
-    tiles = torch.empty_like(block.split)
-    torch.bmm(answers.transpose(0, 1), net.hidden.transpose(1, 2), out=tiles.transpose(0, 1))
+    tiles = torch.bmm(answers.transpose(0, 1), net.hidden.transpose(1, 2))
     maps = torch.zeros_like(block.features)
-    _split_transposed(flat(tiles), shape, flat(maps))
+    _split_transposed(tiles.numpy(), shape, flat(maps))
     maps *= block.features > 0
     conv3_bias += maps.sum((0, 1))
     wide = shape[0] + 1, shape[1] + 1
@@ -212,6 +217,6 @@ def _views_gradient(
         one, other = (view[layer].numpy() for view in views)
         join(one, other, (0, 0, start), wide, flat(tiles))
         conv3[layer].baddbmm_(tiles.permute(1, 2, 0), products.transpose(0, 1))
-        torch.bmm(products.transpose(0, 1), weight.transpose(1, 2), out=tiles.transpose(0, 1))
+        given = torch.bmm(products.transpose(0, 1), weight.transpose(1, 2))
         gradients = totals[0][layer].numpy(), totals[1][layer].numpy()
-        _join_transposed(flat(tiles), (one, other), start, wide, gradients)
+        _join_transposed(given.numpy(), (one, other), start, wide, gradients)

@@ -31,7 +31,7 @@ TILE = 4
 POINTS = {3: (0.0, 1.0, -1.0, 2.0, -2.0), 5: (0.0, 1.0, -1.0, 2.0, -2.0, 0.5, -0.5)}
 """Interpolation points for each number of taps; infinity is the last of each."""
 
-T = TypeVar("T", np.float32, NDArray[np.float64])
+T = TypeVar("T", np.float32, NDArray[np.float64], NDArray[np.float32])
 Four = tuple[T, T, T, T]
 Six = tuple[T, T, T, T, T, T]
 Eight = tuple[T, T, T, T, T, T, T, T]
@@ -59,6 +59,46 @@ def load6(p: Flat, n: int, c: int) -> Six[np.float32]:
 def load8(p: Flat, n: int, c: int) -> Eight[np.float32]:
     """Return channel ``c`` of eight numbers of ``n`` channels."""
     return p[c], p[n + c], p[2 * n + c], p[3 * n + c], p[4 * n + c], p[5 * n + c], p[6 * n + c], p[7 * n + c]
+
+
+@inlined
+def gather6(p: NDArray[np.float32], first: int, tile: int) -> Six[Flat]:
+    """Return the channels of six numbers of a tile, a row of six apart: of (number, tile, channel)."""
+    return (
+        p[first, tile],
+        p[6 + first, tile],
+        p[12 + first, tile],
+        p[18 + first, tile],
+        p[24 + first, tile],
+        p[30 + first, tile],
+    )
+
+
+@inlined
+def gather8(p: NDArray[np.float32], first: int, tile: int) -> Eight[Flat]:
+    """Return the channels of eight numbers of a tile, a row of eight apart: of (number, tile, channel)."""
+    return (
+        p[first, tile],
+        p[8 + first, tile],
+        p[16 + first, tile],
+        p[24 + first, tile],
+        p[32 + first, tile],
+        p[40 + first, tile],
+        p[48 + first, tile],
+        p[56 + first, tile],
+    )
+
+
+@inlined
+def pick6(p: Six[Flat], c: int) -> Six[np.float32]:
+    """Return channel ``c`` of six numbers."""
+    return p[0][c], p[1][c], p[2][c], p[3][c], p[4][c], p[5][c]
+
+
+@inlined
+def pick8(p: Eight[Flat], c: int) -> Eight[np.float32]:
+    """Return channel ``c`` of eight numbers."""
+    return p[0][c], p[1][c], p[2][c], p[3][c], p[4][c], p[5][c], p[6][c], p[7][c]
 
 
 @inlined
