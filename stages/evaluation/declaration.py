@@ -36,6 +36,7 @@ class EvaluationNetParams(Schedule):
     )
     flip: bool = Field(True, description="turn half of the samples upside down (mirroring would move the occlusions)")
     relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting; 0: none, as the paper")
+    prior: bool = Field(True, description="count with the samples' share of right disparities; false: with a half")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
     seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
 

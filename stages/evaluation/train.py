@@ -48,7 +48,21 @@ def train_evaluation_net(
         return balanced_cross_entropy(logits.permute(1, 0, 2, 3).reshape(2, -1), labels.reshape(-1))
 
     curve = fit(net, loss, params, monitor or Silent())
+    if params.prior:
+        _undo_the_balance(net, samples["labels"])
     return {"parameters": to_vector(net), "loss": curve}
+
+
+def _undo_the_balance(net: EvaluationNet, labels: NDArray[np.int8]) -> None:
+    """Shift the net's log-odds by those of the samples' classes.
+
+    By Bayes' rule, a score learnt where both classes weighed the same becomes the probability where they are as
+    frequent as in the samples. The order of the scores stays.
+    """
+    right, wrong = (np.count_nonzero(labels == label) for label in (1, 0))
+    if net.out.bias is not None and right and wrong:
+        with torch.no_grad():
+            net.out.bias[1] += np.log(right / wrong)
 
 
 def _layers(images: Arrays, disparity: Arrays) -> NDArray[np.float32]:

@@ -74,6 +74,20 @@ def test_makes_what_it_declares_and_one_seed_makes_it_again() -> None:
     assert len(one["loss"]) == 2
 
 
+def test_the_balance_of_the_classes_is_undone_by_their_odds() -> None:
+    given = inputs(rows=1, columns=2)
+    labels = given["evaluation_samples"]["labels"]
+    labels[:] = np.resize(np.int8([1, 1, 1, 0, -1]), labels.shape)
+    right, wrong = (labels == 1).sum(), (labels == 0).sum()
+    nets = EvaluationNet(), EvaluationNet()
+    for net, prior in zip(nets, (True, False), strict=True):
+        from_vector(net, train_evaluation_net(settings(steps=1, prior=prior), given)["parameters"])
+    shifted, plain = (net.state_dict() for net in nets)
+    moved = {name: (shifted[name] - plain[name]).numpy() for name in plain}
+    assert moved.pop("out.bias") == pytest.approx([0, np.log(right / wrong)], abs=1e-6)
+    assert not any(change.any() for change in moved.values())
+
+
 def test_a_training_that_was_killed_ends_as_an_undisturbed_one() -> None:
     given, params = inputs(rows=1, columns=2), settings(steps=3, checkpoint_steps=1)
     expected = train_evaluation_net(params, given)
