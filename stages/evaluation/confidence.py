@@ -15,7 +15,7 @@ from stages.training import one_thread
 
 
 def confidence(
-    net: EvaluationNet, layers: NDArray[np.float32], precision: Precision = "float32"
+    net: EvaluationNet, layers: NDArray[np.float32], precision: Precision = "float32", flipped: bool = False
 ) -> NDArray[np.float32]:
     """Return the probability that each disparity is right.
 
@@ -23,17 +23,18 @@ def confidence(
         net: the evaluation-Net.
         layers: float32 (layer, y, x) from ``evaluation_layers``.
         precision: arithmetic of the convolutions.
+        flipped: look at the maps upside down too, and take the mean of the two log-odds.
 
     Returns:
         float32 (y, x) in [0, 1]. At the border the patches see the nearest pixel beyond the image.
     """
     require_shape("layers", layers, 3)
     margin = ((0, 0), (RADIUS, RADIUS), (RADIUS, RADIUS))
-    return padded_confidence(net, np.pad(layers, margin, mode="edge"), precision)
+    return padded_confidence(net, np.pad(layers, margin, mode="edge"), precision, flipped)
 
 
 def padded_confidence(
-    net: EvaluationNet, layers: NDArray[np.float32], precision: Precision = "float32"
+    net: EvaluationNet, layers: NDArray[np.float32], precision: Precision = "float32", flipped: bool = False
 ) -> NDArray[np.float32]:
     """As ``confidence``, for layers (layer, y + 100, x + 100) that bring 50 px of context on every side."""
     keep_freed_memory()
@@ -41,6 +42,9 @@ def padded_confidence(
     with torch.inference_mode(), autocast(precision):
         maps = torch.from_numpy(np.ascontiguousarray(layers)).unsqueeze(0)
         log_odds = net.dense(maps.contiguous(memory_format=torch.channels_last))
+        if flipped:
+            other = net.dense(maps.flip(2).contiguous(memory_format=torch.channels_last))
+            log_odds = (log_odds + other.flip(0)) / 2
     result: NDArray[np.float32] = torch.sigmoid(log_odds).numpy()
     return result
 
@@ -52,4 +56,4 @@ def compute_confidence(params: ConfidenceParams, inputs: Inputs) -> dict[str, ND
     images: dict[str, Array] = inputs["images"]
     layers = evaluation_layers(images["left"], images["moments"][0], inputs["disparity"]["disparity"])
     net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-    return {"confidence": padded_confidence(net, layers, params.precision)}
+    return {"confidence": padded_confidence(net, layers, params.precision, params.flipped)}

@@ -42,8 +42,9 @@ class EvaluationNetParams(Schedule):
 
 
 class ConfidenceParams(Params):
-    """In which arithmetic the evaluation-Net runs."""
+    """How the evaluation-Net runs."""
 
+    flipped: bool = Field(False, description="look upside down too, and take the mean; twice the time")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
 
 

@@ -57,10 +57,28 @@ def test_bfloat16_is_close_to_float32() -> None:
     assert np.abs(rough - exact).mean() <= 0.01
 
 
-@pytest.mark.parametrize("rows", [1, 4, 10])
-def test_tiles_equal_the_whole(rows: int) -> None:
+def test_looking_upside_down_too_is_the_mean_of_the_log_odds() -> None:
+    net, layers = random_net(), random_layers(5, 7)
+    one, other = confidence(net, layers), confidence(net, layers[:, ::-1])[::-1]
+    odds = (np.log(one / (1 - one)) + np.log(other / (1 - other))) / 2
+    made = confidence(net, layers, flipped=True)
+    assert np.abs(made - 1 / (1 + np.exp(-odds))).max() <= 1e-5
+    assert np.abs(made - one).max() > 1e-3
+    assert np.abs(made - confidence(net, layers[:, ::-1], flipped=True)[::-1]).max() <= 1e-6, "there is no up"
+
+
+@pytest.mark.parametrize(
+    ("rows", "flipped"),
+    [
+        pytest.param(1, False, id="one row"),
+        pytest.param(4, False, id="parts"),
+        pytest.param(4, True, id="upside down too"),
+        pytest.param(10, False, id="nearly all"),
+    ],
+)
+def test_tiles_equal_the_whole(rows: int, flipped: bool) -> None:
     """Up to the order of the sums in a convolution, which may depend on the size of its input."""
-    params, given = ConfidenceParams(precision="float32"), products(height=11 if rows > 1 else 4)
+    params, given = ConfidenceParams(precision="float32", flipped=flipped), products(height=11 if rows > 1 else 4)
     one, other = tiled(CONFIDENCE, params, given, DIMS, rows), whole(CONFIDENCE, params, given, DIMS)
     assert one["confidence"].dtype == other["confidence"].dtype == np.float32
     assert np.abs(one["confidence"] - other["confidence"]).max() <= 1e-5
