@@ -17,6 +17,8 @@ Policy = Literal["full", "size", "off"]
 """``full``: every byte. ``size``: which files there are, and their sizes. ``off``: record and manifest alone."""
 SETTLED = 0.1
 """Seconds after which a file's times tell every later change; they advance in steps of up to 10 ms."""
+THREADS_PAY = 1 << 20
+"""Bytes from which on starting threads takes less time than they save."""
 
 _Print = tuple[int, int, int, int, int]
 _hashed: dict[str, tuple[_Print, str]] = {}
@@ -128,7 +130,8 @@ def _compare_bytes(folder: Path, manifest: Manifest, remember: bool) -> None:
         return _hash(folder / file.path, remember) != file.sha256
 
     unknown = [file for file in manifest.files if not (remember and _known(folder / file.path) == file.sha256)]
-    for file, wrong in zip(unknown, in_threads(differs, unknown) if unknown else (), strict=True):
+    small = sum(file.size for file in unknown) < THREADS_PAY
+    for file, wrong in zip(unknown, map(differs, unknown) if small else in_threads(differs, unknown), strict=True):
         if wrong:
             raise DamagedEntry(f"the bytes of {file.path} are not those that were written")
 

@@ -17,8 +17,8 @@ from cache.entry import Entry
 from cache.errors import CacheUnavailable
 from cache.files import make_folder, reading, remove, walk, writing
 from cache.layout import Layout
-from cache.lease import cleaning, in_use
-from cache.locks import held, is_held, try_lock
+from cache.lease import cleaning, in_use, remove_stale
+from cache.locks import held, is_held
 from cache.owner import is_abandoned, is_foreign
 from cache.quarantine import move_anything
 from cache.store import Store
@@ -201,15 +201,20 @@ def collect(store: Store, items: Iterable[Item]) -> tuple[Item, ...]:
     Raises:
         CacheUnavailable: if the file system refuses; what was deleted by then stays deleted.
     """
-    layout, trash, done = store.layout, store.layout.new_draft(), []
+    layout, trash, done, items = store.layout, store.layout.new_draft(), [], tuple(items)
     try:
         with writing(layout.root):
             make_folder(trash)
         with cleaning(layout):
             used = in_use(layout)
             for number, item in enumerate(items):
-                if item.name not in used and _move_away(layout, item, trash / str(number)):
+                if (
+                    item.kind != "stale lock"
+                    and item.name not in used
+                    and _move_away(layout, item, trash / str(number))
+                ):
                     done.append(item)
+        done += [item for item in items if item.kind == "stale lock" and remove_stale(layout, item.paths[0])]
     finally:
         remove(trash)
     return tuple(done)
@@ -217,8 +222,6 @@ def collect(store: Store, items: Iterable[Item]) -> tuple[Item, ...]:
 
 def _move_away(layout: Layout, item: Item, target: Path) -> bool:
     """Rename an item's paths to where nobody sees them; return whether there was still anything to move."""
-    if item.kind == "stale lock":
-        return _remove_stale(layout, item.paths[0])
     if item.kind in ("draft", "quarantine", "checkpoint"):
         return _rename_all(item, target)
     with held(layout.lock("commit", item.name)):
@@ -245,13 +248,3 @@ def _rename_all(item: Item, target: Path) -> bool:
         except OSError as error:
             raise CacheUnavailable(f"cannot delete {path} from the cache: {error.strerror or error}") from error
     return moved
-
-
-def _remove_stale(layout: Layout, path: Path) -> bool:
-    """Delete a lock's file while holding it, so that nobody takes a lock that is then deleted."""
-    if path == layout.locks / "leases":  # held by this very call, and deleted at its end
-        return True
-    if (taken := try_lock(path)) is None:
-        return False
-    taken.release()
-    return True

@@ -117,6 +117,11 @@ class Layout:
                 tag.write_text(_TAG, encoding="ascii")
 
 
+def is_key(text: str) -> bool:
+    """Return whether a text has the form of a key."""
+    return _KEY.fullmatch(text) is not None
+
+
 def require_key(key: str) -> str:
     """Return ``key`` if it is one: a key becomes part of a path.
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cache.errors import CacheUnavailable
-from cache.files import reading, writing
-from cache.layout import Layout, require_key
-from cache.locks import held, is_held, lock
+from cache.files import reading, remove, writing
+from cache.layout import Layout, is_key, require_key
+from cache.locks import held, is_held, lock, try_lock
 
 _LINE = re.compile(r"^([0-9a-f]{64})\n", re.ASCII | re.MULTILINE)
 
@@ -86,3 +86,44 @@ def in_use(layout: Layout) -> frozenset[str]:
                 with suppress(FileNotFoundError):
                     found.update(_LINE.findall(path.read_text(encoding="ascii", errors="replace")))
     return frozenset(found)
+
+
+def sweep_locks(layout: Layout) -> None:
+    """Delete the files of locks and leases whose processes are gone.
+
+    Raises:
+        CacheUnavailable: if the file system refuses.
+    """
+    for folder in (layout.locks, layout.leases):
+        with reading(folder):
+            stale = [path for path in folder.iterdir() if not is_held(path)] if folder.is_dir() else []
+        for path in stale:
+            remove_stale(layout, path)
+
+
+def remove_stale(layout: Layout, path: Path) -> bool:
+    """Delete a lock's file if nobody holds it, while holding it: nobody then takes a lock that is deleted."""
+    if path.parent == layout.leases:
+        with cleaning(layout):  # a lease that is just being opened is not locked yet
+            return _remove_unheld(path)
+    return _remove_unheld(path)
+
+
+def _remove_unheld(path: Path) -> bool:
+    taken = try_lock(path) if path.exists() else None
+    if taken:
+        taken.release()
+    return taken is not None
+
+
+def sweep_checkpoints(layout: Layout) -> None:
+    """Delete the checkpoints of products that are there, unless somebody makes one again.
+
+    Raises:
+        CacheUnavailable: if the file system refuses.
+    """
+    with reading(layout.checkpoints):
+        names = [path.name for path in layout.checkpoints.iterdir()] if layout.checkpoints.is_dir() else []
+    for key in filter(is_key, names):
+        if layout.record(key).exists() and not is_held(layout.lock("making", key)):
+            remove(layout.checkpoint(key))

@@ -1,7 +1,7 @@
 """The cache as its users see it: find, require, open, begin."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import time
@@ -12,11 +12,11 @@ from cache.check import Finding, Policy, inspect, read_record
 from cache.document import plain_mapping
 from cache.draft import Draft
 from cache.entry import Entry
-from cache.errors import DamagedEntry, EntryNotFound
+from cache.errors import CacheUnavailable, DamagedEntry, EntryNotFound
 from cache.files import make_folder, reading, remove, writing
 from cache.key import Recipe, require_texts
 from cache.layout import Layout
-from cache.lease import Lease, leased
+from cache.lease import Lease, leased, sweep_checkpoints, sweep_locks
 from cache.locks import Lock, holder, try_lock
 from cache.owner import is_abandoned
 from cache.quarantine import set_aside_if_damaged
@@ -189,10 +189,13 @@ class Store:
         return kept_source(self.layout, code_hash)
 
     def sweep_drafts(self) -> int:
-        """Delete the drafts of processes of this host that are gone; return how many there were."""
+        """Delete what dead processes of this host left: drafts, which it counts, locks, done checkpoints."""
         drafts = self.layout.drafts
         with reading(drafts):
             abandoned = [path for path in drafts.iterdir() if is_abandoned(path.name)] if drafts.is_dir() else []
         for path in abandoned:
             remove(path)
+        with suppress(CacheUnavailable):
+            sweep_locks(self.layout)
+            sweep_checkpoints(self.layout)
         return len(abandoned)

@@ -16,7 +16,7 @@ import numpy as np
 from cache import DamagedEntry, Draft, Entry, EntryNotFound, Recipe, Store
 from pipeline.checkpoints import Checkpoints
 from pipeline.claims import Claims
-from pipeline.errors import USER_ERRORS, StageFailed, StageRefused
+from pipeline.errors import DISK_ERRNOS, USER_ERRORS, StageFailed, StageRefused
 from pipeline.steps import Step
 from pipeline.tiles import Rows, read_block, trim
 from stages.stage import Array, Arrays, Output
@@ -274,4 +274,5 @@ def explained(step: Step, where: str = "") -> Iterator[None]:
     except Exception as error:
         place = f"{step.name}, {where}" if where else step.name
         message = f"{place}: {error}" if str(error) else f"{place}: {type(error).__name__}"
-        raise (StageRefused if isinstance(error, USER_ERRORS) else StageFailed)(message) from error
+        disk = isinstance(error, OSError) and error.errno in DISK_ERRNOS
+        raise (StageRefused if disk or isinstance(error, USER_ERRORS) else StageFailed)(message) from error
