@@ -44,13 +44,13 @@ def read_record(layout: Layout, key: str) -> Entry:
     path = layout.record(key)
     with reading(path):
         try:
-            data = _read_plain(path)
+            data = read_plain(path)
         except FileNotFoundError:
             raise EntryNotFound(f"no entry has the key {key} in {layout.root}") from None
     return Entry.from_bytes(key, data)
 
 
-def _read_plain(path: Path) -> bytes:
+def read_plain(path: Path) -> bytes:
     """Return a file's bytes; a link in its place is damage, wherever it leads."""
     if not stat.S_ISREG(path.lstat().st_mode):
         raise DamagedEntry(f"{path} is not a plain file")
@@ -94,7 +94,7 @@ def _read_manifest(folder: Path, entry: Entry) -> Manifest:
     """Return the manifest if it is the one that the record tells."""
     if not stat.S_ISDIR(folder.lstat().st_mode):
         raise DamagedEntry(f"{folder} is not a folder")
-    manifest = Manifest.from_bytes(_read_plain(folder / MANIFEST))
+    manifest = Manifest.from_bytes(read_plain(folder / MANIFEST))
     if (manifest.digest, manifest.size) != (entry.digest, entry.size):
         raise DamagedEntry(f"its manifest has digest {manifest.digest}, its record {entry.digest}")
     return manifest

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from cache.check import read_plain
 from cache.document import FORMAT_VERSION
 from cache.entry import Entry
 from cache.errors import CacheUnavailable
@@ -156,7 +157,7 @@ def _unreadable(layout: Layout, key: str) -> Item | None:
     """Return a record that is not well-formed as an item; None for one of a newer format, which is not ours."""
     path = layout.record(key)
     try:
-        version = json.loads(path.read_bytes())["format"]
+        version = json.loads(read_plain(path))["format"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         version = None
     newer = type(version) is int and version > FORMAT_VERSION

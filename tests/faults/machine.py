@@ -123,7 +123,7 @@ def random_sequences(scale: float) -> Tally:
             CacheMachine,
             settings=settings(
                 max_examples=examples,
-                stateful_step_count=20,
+                stateful_step_count=20 if scale >= 0.2 else 10,
                 deadline=None,
                 derandomize=scale < 1,
                 phases=[Phase.generate] if scale < 1 else [Phase.generate, Phase.shrink],

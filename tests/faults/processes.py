@@ -32,7 +32,7 @@ def kill_at_random(scale: float) -> Tally:
     tally, chance = Tally(), random.Random(2)
     for number in range(max(2, int(25 * scale))):
         _killed(tally, f"trial {number}", chance.uniform(0.05, 0.6), pause=0.01, workers=1 + number % 2)
-    for number in range(int(25 * scale) if scale >= 1 else 0):
+    for number in range(int(10 * scale) if scale >= 1 else 0):
         _killed_pipeline(tally, f"pipeline {number}", chance.uniform(0.2, 4.0))
     return tally
 
