@@ -136,6 +136,11 @@ def _compare_bytes(folder: Path, manifest: Manifest, remember: bool) -> None:
             raise DamagedEntry(f"the bytes of {file.path} are not those that were written")
 
 
+def forget() -> None:
+    """Forget all hashes of this process: every byte is read again."""
+    _hashed.clear()
+
+
 def _hash(path: Path, remember: bool) -> str | None:
     """Return a file's sha256, and keep it if a later change of the file is sure to show; None if the disk fails."""
     before, now = _fingerprint(path), time.time()
