@@ -21,12 +21,19 @@ def test_nothing_is_wrong_lost_left_over_or_unexplained(row: Row) -> None:
     assert not any(count for name, count in total([found]).items() if name != "injected")
 
 
+needs_outcome = pytest.mark.skipif(
+    not (PROJECT / "docs/faults.json").exists(), reason="no outcome to compare with: run `make faults`"
+)
+
+
+@needs_outcome
 def test_what_the_documents_quote_is_what_make_faults_found() -> None:
     rows = json.loads((PROJECT / "docs/faults.json").read_text())["rows"]
     for name, text in QUOTES.items():
         assert MARKS.search((PROJECT / name).read_text())[0] == f"<!-- make faults -->\n{text(rows)}\n<!-- end -->"  # type: ignore[index]
 
 
+@needs_outcome
 def test_the_large_form_is_as_large_as_promised_and_clean() -> None:
     found = json.loads((PROJECT / "docs/faults.json").read_text())
     assert [row["row"] for row in found["rows"]] == [row.number for row in ROWS]
