@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test lint train bench wheel clean
+.PHONY: demo test lint train bench faults wheel clean
 
 demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
 	$(BIN)/pipeline run motorcycle --output demo
@@ -24,6 +24,11 @@ train: $(READY)  ## DATA=DIR: train both networks on DIR/2001, 2003, 2005 and 20
 
 bench: $(READY)  ## DATA=DIR (optional): bfloat16 against float32
 	$(BIN)/python -m benchmarks.precision --rows 12 $(if $(DATA),middlebury:$(DATA)/MiddEval3/trainingQ,motorcycle)
+
+	$(BIN)/python -m benchmarks.guarding
+
+faults: $(READY)  ## inject every fault of the matrix, and put the outcome where README.md and docs/cache.md quote it
+	$(BIN)/python -m tests.faults --json docs/faults.json --quote
 
 wheel: $(READY)
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir dist .

@@ -12,12 +12,13 @@
 array([0, 1, 4])
 """
 
-from cache.code import code_hash, code_parts
+from cache.code import code_hash, code_hash_of, code_parts
 from cache.draft import Draft
 from cache.entry import Entry
 from cache.errors import (
     CacheError,
     CacheUnavailable,
+    DamagedArchive,
     DamagedEntry,
     EntryNotFound,
     IncompleteDraft,
@@ -28,6 +29,8 @@ from cache.errors import (
     SourceNotFound,
 )
 from cache.key import ABSENT, Change, Recipe, differences
+from cache.lease import Lease
+from cache.locks import Lock
 from cache.store import Store
 
 __all__ = [
@@ -35,6 +38,7 @@ __all__ = [
     "CacheError",
     "CacheUnavailable",
     "Change",
+    "DamagedArchive",
     "DamagedEntry",
     "Draft",
     "Entry",
@@ -43,11 +47,14 @@ __all__ = [
     "InvalidArray",
     "InvalidKey",
     "InvalidRecipe",
+    "Lease",
+    "Lock",
     "NonDeterministicStage",
     "Recipe",
     "SourceNotFound",
     "Store",
     "code_hash",
+    "code_hash_of",
     "code_parts",
     "differences",
 ]

@@ -17,6 +17,8 @@ Policy = Literal["full", "size", "off"]
 """``full``: every byte. ``size``: which files there are, and their sizes. ``off``: record and manifest alone."""
 SETTLED = 0.1
 """Seconds after which a file's times tell every later change; they advance in steps of up to 10 ms."""
+THREADS_PAY = 1 << 20
+"""Bytes from which on starting threads takes less time than they save."""
 
 _Print = tuple[int, int, int, int, int]
 _hashed: dict[str, tuple[_Print, str]] = {}
@@ -42,13 +44,13 @@ def read_record(layout: Layout, key: str) -> Entry:
     path = layout.record(key)
     with reading(path):
         try:
-            data = _read_plain(path)
+            data = read_plain(path)
         except FileNotFoundError:
             raise EntryNotFound(f"no entry has the key {key} in {layout.root}") from None
     return Entry.from_bytes(key, data)
 
 
-def _read_plain(path: Path) -> bytes:
+def read_plain(path: Path) -> bytes:
     """Return a file's bytes; a link in its place is damage, wherever it leads."""
     if not stat.S_ISREG(path.lstat().st_mode):
         raise DamagedEntry(f"{path} is not a plain file")
@@ -92,7 +94,7 @@ def _read_manifest(folder: Path, entry: Entry) -> Manifest:
     """Return the manifest if it is the one that the record tells."""
     if not stat.S_ISDIR(folder.lstat().st_mode):
         raise DamagedEntry(f"{folder} is not a folder")
-    manifest = Manifest.from_bytes(_read_plain(folder / MANIFEST))
+    manifest = Manifest.from_bytes(read_plain(folder / MANIFEST))
     if (manifest.digest, manifest.size) != (entry.digest, entry.size):
         raise DamagedEntry(f"its manifest has digest {manifest.digest}, its record {entry.digest}")
     return manifest
@@ -128,9 +130,15 @@ def _compare_bytes(folder: Path, manifest: Manifest, remember: bool) -> None:
         return _hash(folder / file.path, remember) != file.sha256
 
     unknown = [file for file in manifest.files if not (remember and _known(folder / file.path) == file.sha256)]
-    for file, wrong in zip(unknown, in_threads(differs, unknown) if unknown else (), strict=True):
+    small = sum(file.size for file in unknown) < THREADS_PAY
+    for file, wrong in zip(unknown, map(differs, unknown) if small else in_threads(differs, unknown), strict=True):
         if wrong:
             raise DamagedEntry(f"the bytes of {file.path} are not those that were written")
+
+
+def forget() -> None:
+    """Forget all hashes of this process: every byte is read again."""
+    _hashed.clear()
 
 
 def _hash(path: Path, remember: bool) -> str | None:

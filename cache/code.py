@@ -8,7 +8,7 @@ Modules are found and parsed, never imported.
 
 import ast
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec, resolve_name
@@ -34,7 +34,12 @@ class _Module:
 
 def code_hash(module: str, packages: tuple[str, ...]) -> str:
     """Return one hash over ``code_parts``, in hexadecimal."""
-    return digest(code_parts(module, packages))
+    return code_hash_of(code_parts(module, packages))
+
+
+def code_hash_of(parts: Mapping[str, str]) -> str:
+    """Return one hash over the modules of a recipe, as ``code_parts`` gave them."""
+    return digest(parts)
 
 
 def code_parts(module: str, packages: tuple[str, ...]) -> dict[str, str]:
@@ -57,9 +62,37 @@ def code_parts(module: str, packages: tuple[str, ...]) -> dict[str, str]:
     while waiting:
         name = waiting.pop()
         if name not in found and (located := _locate(name)) and located.file:
-            found[name], imports = _read(located)
+            found[name], imports, _ = _read(located)
             waiting += (part for each in (name, *imports) for part in _parents(each) if part.split(".")[0] in packages)
     return dict(sorted(found.items()))
+
+
+def source_text(module: str) -> str | None:
+    """Return the text that ``code_parts`` hashed for a module, None if it has none."""
+    located = _locate(module)
+    return _read(located)[2] if located and located.file else None
+
+
+def bare_tree(text: str | bytes) -> ast.AST:
+    """Return a source's syntax tree without docstrings, all that its hash is over.
+
+    Raises:
+        SyntaxError, ValueError: if it is no Python.
+    """
+    tree: ast.AST = _Bare().visit(ast.parse(text))
+    return tree
+
+
+def source_hash(text: str | bytes) -> str:
+    """Return the hash of a source: over its syntax tree without comments, docstrings and positions.
+
+    >>> source_hash("x = 1") == source_hash("x  =  1  # one")
+    True
+
+    Raises:
+        SyntaxError, ValueError: if it is no Python.
+    """
+    return hashlib.sha256(ast.dump(bare_tree(text)).encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def _parents(module: str) -> Iterator[str]:
@@ -98,14 +131,14 @@ def _locate_top(name: str) -> _Module | None:
 
 
 @cache
-def _read(module: _Module) -> tuple[str, frozenset[str]]:
-    """Return the hash of a module's tree, and the dotted names that it may import."""
+def _read(module: _Module) -> tuple[str, frozenset[str], str]:
+    """Return the hash of a module's tree, the dotted names that it may import, and its text."""
     try:
-        tree = ast.parse(module.file.read_bytes() if module.file else b"")
-    except (OSError, SyntaxError, ValueError) as error:
+        data = module.file.read_bytes() if module.file else b""
+        imports, hashed = frozenset(_imports(ast.parse(data), module)), source_hash(data)
+    except (OSError, SyntaxError, ValueError, RecursionError) as error:
         raise SourceNotFound(f"cannot read the source {module.file}: {error}") from error
-    imports = frozenset(_imports(tree, module))
-    return hashlib.sha256(ast.dump(_Bare().visit(tree)).encode("utf-8", "surrogatepass")).hexdigest(), imports
+    return hashed, imports, data.decode("utf-8", "replace")
 
 
 class _Bare(ast.NodeTransformer):

@@ -31,6 +31,10 @@ class DamagedEntry(CacheError, OSError):
     """An entry is not, to the byte, what was published."""
 
 
+class DamagedArchive(CacheError, ValueError):
+    """An archive of entries is not, to the byte, what was exported, or holds what no export writes."""
+
+
 class NonDeterministicStage(CacheError, RuntimeError):
     """The same recipe gave two different results."""
 

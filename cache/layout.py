@@ -7,6 +7,9 @@
     ROOT/drafts/OWNER-RANDOM/       work in progress, seen by its owner alone
     ROOT/quarantine/KEY-RANDOM/     damaged entries, moved aside
     ROOT/locks/                     held locks
+    ROOT/leases/OWNER-RANDOM        the keys that a running process uses: nobody cleans them away
+    ROOT/sources/ab/HASH.py         the text of each module that made an entry, to say later what changed
+    ROOT/checkpoints/KEY            states of long work, until its product is there
     ROOT/CACHEDIR.TAG               tells backup programs to skip it
 """
 
@@ -45,6 +48,21 @@ class Layout:
         """Where damaged entries are moved."""
         return self.root / "quarantine"
 
+    @property
+    def locks(self) -> Path:
+        """Where held locks are."""
+        return self.root / "locks"
+
+    @property
+    def leases(self) -> Path:
+        """Where running processes say what they use."""
+        return self.root / "leases"
+
+    @property
+    def checkpoints(self) -> Path:
+        """Where the states of long work are."""
+        return self.root / "checkpoints"
+
     def record(self, key: str) -> Path:
         """Return the file whose existence makes the entry exist."""
         return self.root / "records" / require_key(key)[:2] / f"{key}.json"
@@ -55,7 +73,19 @@ class Layout:
 
     def lock(self, name: str, key: str) -> Path:
         """Return the file of one of the key's locks."""
-        return self.root / "locks" / f"{require_key(key)}.{name}"
+        return self.locks / f"{require_key(key)}.{name}"
+
+    def source(self, code_hash: str) -> Path:
+        """Return the file of a module's text, by the hash of its code."""
+        return self.root / "sources" / require_key(code_hash)[:2] / f"{code_hash}.py"
+
+    def checkpoint(self, key: str) -> Path:
+        """Return the file of the latest state of work on ``key``."""
+        return self.checkpoints / require_key(key)
+
+    def new_lease(self) -> Path:
+        """Return a path for a lease that nobody else has; it says whose it is."""
+        return self.leases / f"{owner()}-{secrets.token_hex(8)}"
 
     def new_draft(self) -> Path:
         """Return a path for a draft that nobody else has; it says whose it is."""
@@ -80,10 +110,16 @@ class Layout:
             CacheUnavailable: if they cannot be made.
         """
         with writing(self.root):
-            for folder in ("records", "entries", "drafts", "quarantine", "locks"):
+            for folder in ("records", "entries", "drafts", "quarantine", "locks", "leases"):
                 make_folder(self.root / folder)
-            if not (tag := self.root / "CACHEDIR.TAG").exists():
+            tag = self.root / "CACHEDIR.TAG"
+            if not tag.exists() or tag.stat().st_size != len(_TAG):  # a disk that was full may have left a part
                 tag.write_text(_TAG, encoding="ascii")
+
+
+def is_key(text: str) -> bool:
+    """Return whether a text has the form of a key."""
+    return _KEY.fullmatch(text) is not None
 
 
 def require_key(key: str) -> str:

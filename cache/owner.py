@@ -6,12 +6,26 @@ import socket
 from functools import cache
 from pathlib import Path
 
-_OWNED = re.compile(r"(?P<host>[A-Za-z0-9._]+)-(?P<pid>\d+)-(?P<start>\d+)-[0-9a-f]+(\.json)?", re.ASCII)
+_WHO = r"(?P<host>[A-Za-z0-9._]+)-(?P<pid>\d+)-(?P<start>\d+)"
+_OWNER = re.compile(_WHO, re.ASCII)
+_OWNED = re.compile(_WHO + r"-[0-9a-f]+(\.json)?", re.ASCII)
 
 
 def owner() -> str:
     """Return the name of this process: ``host-pid-start``, start in clock ticks since boot (0 if unknown)."""
     return f"{_host()}-{os.getpid()}-{_start(os.getpid())}"
+
+
+def describe(name: str) -> str | None:
+    """Return what ``owner`` gave as words for people, ``process 123 on host``; None for any other text."""
+    match = _OWNER.fullmatch(name)
+    return f"process {match['pid']} on {match['host']}" if match else None
+
+
+def is_foreign(name: str) -> bool:
+    """Return whether the thing of this name belongs to a process of another host, of which nothing is known."""
+    match = _OWNED.fullmatch(name)
+    return match is None or match["host"] != _host()
 
 
 def is_abandoned(name: str) -> bool:

@@ -1,7 +1,7 @@
 """The cache as its users see it: find, require, open, begin."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import time
@@ -12,13 +12,15 @@ from cache.check import Finding, Policy, inspect, read_record
 from cache.document import plain_mapping
 from cache.draft import Draft
 from cache.entry import Entry
-from cache.errors import DamagedEntry, EntryNotFound
-from cache.files import make_folder, remove, writing
+from cache.errors import CacheUnavailable, DamagedEntry, EntryNotFound
+from cache.files import make_folder, reading, remove, writing
 from cache.key import Recipe, require_texts
 from cache.layout import Layout
-from cache.locks import held
+from cache.lease import Lease, leased, sweep_checkpoints, sweep_locks
+from cache.locks import Lock, holder, try_lock
 from cache.owner import is_abandoned
 from cache.quarantine import set_aside_if_damaged
+from cache.sources import keep_sources, kept_source
 
 if TYPE_CHECKING:
     import xarray
@@ -153,29 +155,47 @@ class Store:
         found = [entry for entry in self.entries() if entry.label == dict(label)]
         return sorted(found, key=lambda entry: (entry.created, entry.key), reverse=True)
 
-    def lock(self, key: str) -> AbstractContextManager[None]:
-        """Return a context in which no other process or thread holds the lock of ``key``.
+    def claim(self, key: str) -> Lock | None:
+        """Return the lock of making ``key``, None while another process or thread holds it; see ``claimant``.
 
-        It saves work that two would do twice; it ends with its process, however that ends. Do not
-        take it twice: the second would wait for the first.
+        It saves work that two would do twice; it ends with its process, however that ends.
 
         Raises:
             InvalidKey: if ``key`` is not one.
             CacheUnavailable: if the folder cannot be written.
         """
-        return self._lock(self.layout.lock("making", key))
-
-    @contextmanager
-    def _lock(self, path: Path) -> Iterator[None]:
-        """Hold a lock; the folder may have to be made first."""
+        path = self.layout.lock("making", key)
         self.layout.create()
-        with held(path):
-            yield
+        return try_lock(path)
+
+    def claimant(self, key: str) -> str | None:
+        """Return who is making ``key``, such as ``process 123 on host``; None if nobody says so."""
+        return holder(self.layout.lock("making", key))
+
+    def lease(self) -> AbstractContextManager[Lease]:
+        """Return a context whose ``add(keys)`` keeps entries, there or to come, from being cleaned away."""
+        return leased(self.layout)
+
+    def keep_sources(self, code: Mapping[str, str]) -> None:
+        """Keep the texts of modules beside the entries, so that a change of code can be told by function and line.
+
+        Args:
+            code: hash by module name, as in a recipe.
+        """
+        keep_sources(self.layout, code)
+
+    def kept_source(self, code_hash: str) -> str | None:
+        """Return the text of a module that was kept under the hash of its code; None if there is none."""
+        return kept_source(self.layout, code_hash)
 
     def sweep_drafts(self) -> int:
-        """Delete the drafts of processes of this host that are gone; return how many there were."""
+        """Delete what dead processes of this host left: drafts, which it counts, locks, done checkpoints."""
         drafts = self.layout.drafts
-        abandoned = [path for path in drafts.iterdir() if is_abandoned(path.name)] if drafts.is_dir() else []
+        with reading(drafts):
+            abandoned = [path for path in drafts.iterdir() if is_abandoned(path.name)] if drafts.is_dir() else []
         for path in abandoned:
             remove(path)
+        with suppress(CacheUnavailable):
+            sweep_locks(self.layout)
+            sweep_checkpoints(self.layout)
         return len(abandoned)

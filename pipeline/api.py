@@ -1,5 +1,6 @@
 """The verbs of the command line as functions. Products come back as lazy xarray datasets."""
 
+import functools
 import itertools
 import math
 import os
@@ -13,9 +14,9 @@ import numpy as np
 
 from cache import Store
 from datasets import SceneSource, open_dataset
+from pipeline.attempts import attempt
 from pipeline.config import Config, parse_setting
 from pipeline.errors import UsageError
-from pipeline.execute import execute
 from pipeline.plan import Plan, Planned, make_plan
 from pipeline.steps import Request, training_scenes
 from pipeline.tasks import Made, Unwatched, Watch, provenance, read_arrays
@@ -173,9 +174,9 @@ def _run(
     workers: int | None,
 ) -> Result:
     store = open_store(task.cache)
-    plan = make_plan(request, store, forced)
     extras = provenance(sys.argv, next(iter(request.configs.values())).model_dump(mode="json"))
-    made = execute(plan, store, watch or Unwatched(), extras, scheduler, workers)
+    planned = functools.partial(make_plan, request, store, forced)
+    plan, made = attempt(planned, store, watch or Unwatched(), extras, scheduler, workers)
     return Result(plan, made, store, list(_metric_rows(plan, store, made)))
 
 

@@ -1,6 +1,7 @@
-"""List, verify and measure a cache."""
+"""List, verify and measure a cache, or a part of it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -9,33 +10,99 @@ from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
+from cache import Entry, Store
+from cache.gc import last_used
 from cache.verify import size, verify
 from pipeline.api import open_store
+from pipeline.belonging import Belonging
 from pipeline.console import print_json, results
+from pipeline.errors import UsageError
 
 
-def list_entries(folder: Path | None, as_json: bool) -> None:
-    """Print a line an entry, oldest first."""
-    entries = sorted(open_store(folder).entries(), key=lambda entry: entry.created)
+@dataclass(frozen=True)
+class Selection:
+    """Which entries a command is about: all, or those of some keys, a product or a scene."""
+
+    keys: tuple[str, ...] = ()
+    product: str | None = None
+    scene: str | None = None
+
+    def of(self, store: Store) -> list[Entry]:
+        """Return the entries selected, oldest first.
+
+        Raises:
+            UsageError: if a key is the start of none, or of several.
+        """
+        entries = sorted(store.entries(), key=lambda entry: entry.created)
+        wanted = {_only(entries, start).key for start in self.keys} if self.keys else None
+        return [entry for entry in entries if (wanted is None or entry.key in wanted) and self._fits(entry)]
+
+    def require(self, store: Store) -> list[Entry]:
+        """Return the entries selected, at least one.
+
+        Raises:
+            UsageError: if there is none.
+        """
+        if not (found := self.of(store)):
+            raise UsageError(f"no entry of {store.root} is selected: `pipeline cache ls` shows what there is")
+        return found
+
+    def _fits(self, entry: Entry) -> bool:
+        scene = entry.label.get("scene", "")
+        return self.product in (None, entry.label.get("product")) and self.scene in (
+            None,
+            scene,
+            scene.rsplit("/", 1)[-1],
+        )
+
+    @property
+    def is_all(self) -> bool:
+        """Whether nothing narrows it down."""
+        return self == Selection()
+
+
+def _only(entries: Iterable[Entry], start: str) -> Entry:
+    found = [entry for entry in entries if entry.key.startswith(start)] if start else []
+    if len(found) != 1:
+        raise UsageError(f"key {start!r}: {len(found)} entries begin so; `pipeline cache ls --json` shows whole keys")
+    return found[0]
+
+
+def list_entries(folder: Path | None, selection: Selection, as_json: bool) -> None:
+    """Print a line an entry, oldest first, with the settings that it belongs to."""
+    store = open_store(folder)
+    entries, belonging = selection.of(store), Belonging(store.entries())
     if as_json:
         names = ("key", "digest", "created", "seconds", "size")
-        print_json(
-            {"entries": [{**entry.label, **{name: getattr(entry, name) for name in names}} for entry in entries]}
-        )
+        rows = [
+            {**entry.label, **{name: getattr(entry, name) for name in names}, "last_used": _used(store, entry)}
+            | {"settings": belonging.text(entry)}
+            for entry in entries
+        ]
+        print_json({"entries": rows})
         return
-    table = Table("product", "dataset", "scene", "size", "age", "made in", "key", box=None)
+    table = Table("product", "dataset", "scene", "size", "age", "last used", "made in", "key", "settings", box=None)
+    table.columns[-1].no_wrap = True
     for entry in entries:
         label = [escape(entry.label.get(name, "")) for name in ("product", "dataset", "scene")]
-        table.add_row(*label, bytes_text(entry.size), _age(entry.created), f"{entry.seconds:.2f} s", entry.key[:12])
-    results().print(table)
+        times = (_age(entry.created), _age(_used(store, entry)), f"{entry.seconds:.2f} s")
+        table.add_row(*label, bytes_text(entry.size), *times, entry.key[:12], escape(belonging.text(entry)))
+    console = results()
+    console.print(table)
+    console.print(f"{len(entries)} entries, {bytes_text(sum(entry.size for entry in entries))}")
 
 
-def verify_entries(folder: Path | None, as_json: bool) -> bool:
-    """Check every byte of every entry, print what is wrong; return whether nothing is."""
+def _used(store: Store, entry: Entry) -> str:
+    return datetime.fromtimestamp(last_used(store.layout, entry.key), UTC).isoformat(timespec="seconds")
+
+
+def verify_entries(folder: Path | None, selection: Selection, as_json: bool) -> bool:
+    """Check every byte of the entries, print what is wrong; return whether nothing is."""
     store = open_store(folder)
+    keys = None if selection.is_all else [entry.key for entry in selection.require(store)]
     with Progress(console=Console(stderr=True), transient=True, disable=not Console(stderr=True).is_terminal) as bar:
         task = bar.add_task("verifying", total=None)
-        report = verify(store, progress=lambda done, total: bar.update(task, completed=done, total=total))
+        report = verify(store, keys, progress=lambda done, total: bar.update(task, completed=done, total=total))
     sound = not report.damaged
     if as_json:
         print_json(

@@ -4,7 +4,8 @@ import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
-from cache.files import writing
+from cache.files import reading, writing
+from cache.layout import Layout
 from datasets.formats.atomic import atomic_write
 
 Report = Callable[[int, int, str], None]
@@ -19,7 +20,7 @@ class Checkpoints:
     """
 
     def __init__(self, root: Path, key: str, report: Report | None = None) -> None:
-        self.file = root / "checkpoints" / key
+        self.file = Layout(root).checkpoint(key)
         self._report = report
 
     def progress(self, done: int, total: int, note: str = "") -> None:
@@ -39,14 +40,20 @@ class Checkpoints:
                 file.write(hashlib.sha256(state).digest() + state)
 
     def load(self) -> bytes | None:
-        """Return the latest checkpoint; None if there is none, or it is not what was saved."""
-        if not self.file.is_file():
-            return None
-        data = self.file.read_bytes()
+        """Return the latest checkpoint; None if there is none, or it is not what was saved.
+
+        Raises:
+            CacheUnavailable: if the file system refuses.
+        """
+        with reading(self.file):
+            if not self.file.is_file():
+                return None
+            data = self.file.read_bytes()
         state = data[_DIGEST:]
         return state if hashlib.sha256(state).digest() == data[:_DIGEST] else None
 
     def remove(self) -> None:
         """Delete the checkpoint, and what a killed writer left of one: the product is there."""
-        for file in (self.file, *self.file.parent.glob(f".{self.file.name}.*")):
-            file.unlink(missing_ok=True)
+        with writing(self.file):
+            for file in (self.file, *self.file.parent.glob(f".{self.file.name}.*")):
+                file.unlink(missing_ok=True)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipeline.cli_cache import cache_app
+
 if TYPE_CHECKING:
     from pipeline.api import Result, Task
     from pipeline.plan import Plan
@@ -19,7 +21,6 @@ app = typer.Typer(
     add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
-cache_app = typer.Typer(help="Look into the cache.", no_args_is_help=True)
 data_app = typer.Typer(help="Look at datasets.", no_args_is_help=True)
 app.add_typer(cache_app, name="cache")
 app.add_typer(data_app, name="data")
@@ -141,15 +142,18 @@ def explain(
     settings: SetOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
+    graph: Annotated[Path | None, typer.Option("--graph", help="Draw what it was made from (SVG, PNG, PDF).")] = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what a product's key is made of."""
+    """Show what a product's key is made of, why it would be made again, and what it was made from."""
     from pipeline import api
-    from pipeline.explanation import explanation, print_explanation
+    from pipeline.explanation import draw_provenance, explanation, print_explanation
 
     planned = api.explain(_task(dataset, scene, settings, config, train, cache), product)
     found = explanation(planned, api.open_store(cache))
+    if graph:
+        draw_provenance(planned, api.open_store(cache), graph)
     if as_json:
         from pipeline.console import print_json
 
@@ -181,31 +185,6 @@ def inspect(
     if png:
         draw(found, png, pixel, disparity)
     print_inspection(found, png, as_json)
-
-
-@cache_app.command("ls")
-def cache_ls(cache: CacheOption = None, as_json: JsonOption = False) -> None:
-    """List the entries: product, scene, size, age, key."""
-    from pipeline.cachetools import list_entries
-
-    list_entries(cache, as_json)
-
-
-@cache_app.command("verify")
-def cache_verify(cache: CacheOption = None, as_json: JsonOption = False) -> None:
-    """Read every entry and compare it with what was published; exit with 1 if one is damaged."""
-    from pipeline.cachetools import verify_entries
-
-    if not verify_entries(cache, as_json):
-        raise typer.Exit(1)
-
-
-@cache_app.command("size")
-def cache_size(cache: CacheOption = None, as_json: JsonOption = False) -> None:
-    """Say how much space each product takes."""
-    from pipeline.cachetools import print_sizes
-
-    print_sizes(cache, as_json)
 
 
 @data_app.command("list")

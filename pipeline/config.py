@@ -70,6 +70,8 @@ class Config(BaseModel):
 def _read_toml(file: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(file.read_text())
+    except RecursionError:
+        raise UsageError(f"configuration {file}: it is nested too deeply") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise UsageError(f"configuration {file}: {getattr(error, 'strerror', None) or error}") from None
 

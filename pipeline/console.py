@@ -10,7 +10,8 @@ from rich.table import Table
 
 from cache import Change
 from pipeline.execute import totals
-from pipeline.plan import PENDING, Plan, Planned
+from pipeline.plan import Plan, Planned
+from pipeline.reasons import PENDING
 from pipeline.tasks import Made
 
 STYLES = {"hit": "green", "made": "cyan", "stale": "yellow", "missing": "dim"}
@@ -41,6 +42,7 @@ def _step_row(planned: Planned, made: Made | None) -> dict[str, Any]:
         "state": state,
         "changed": [_change_row(change) for change in planned.changed],
         **({"damage": planned.damage} if planned.damage else {}),
+        **({"why": list(planned.causes)} if planned.causes else {}),
         "seconds": made.seconds if made else planned.seconds,
     }
 
@@ -73,6 +75,8 @@ def why(planned: Planned) -> str:
         return f"damaged: {planned.damage}"
     if planned.state == "missing":
         return "never made" if planned.key else "never made; its inputs are not there yet"
+    if planned.causes:
+        return "; ".join(_telling(planned.causes))
     above = [change.field.removeprefix("inputs.") for change in planned.changed if change.new == PENDING]
     own = [str(change) for change in planned.changed if change.new != PENDING]
     return "; ".join([*_telling(own), *([f"made after {', '.join(above)}"] if above else [])])

@@ -1,5 +1,7 @@
 """What can go wrong in a run: what the user can mend is one line, the rest keeps its cause."""
 
+import errno
+
 from cache import CacheError
 from datasets import DatasetError
 from stages.stage import StageError
@@ -20,6 +22,9 @@ class StageFailed(PipelineError, RuntimeError):  # noqa: N818 - it says what hap
 class StageRefused(UsageError):  # noqa: N818
     """A stage refused what it was given; the message names product, scene, tile and reason."""
 
+
+DISK_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EFBIG})
+"""Of an ``OSError``: what a disk did, in whatever code it was noticed."""
 
 USER_ERRORS = (UsageError, DatasetError, CacheError, StageError)
 """Errors that one line explains: the command line prints it and exits with 2."""

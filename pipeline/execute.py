@@ -4,10 +4,12 @@ import os
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
-from cache import Draft, Store
+from cache import Draft, Lease, Store
 from pipeline import tasks
+from pipeline.claims import Claims, LocalClaims
 from pipeline.errors import UsageError
 from pipeline.plan import Plan, Planned
 from pipeline.steps import Step
@@ -25,6 +27,7 @@ def execute(
     extras: Mapping[str, Any],
     scheduler: str | None = None,
     workers: int | None = None,
+    lease: Lease | None = None,
 ) -> dict[str, Made]:
     """Make what a plan lacks and return every step's result by its id.
 
@@ -35,6 +38,7 @@ def execute(
         extras: stored beside each result.
         scheduler: address of a Dask scheduler, ``tcp://...``; None for threads of this process.
         workers: threads; None for one a core.
+        lease: that the plan's hits were added to; None if nobody cleans the cache meanwhile.
 
     Raises:
         StageRefused: if a stage refuses what it was given.
@@ -43,29 +47,34 @@ def execute(
     store.sweep_drafts()
     if not plan.todo():
         return {planned.step.id: _there(planned) for planned in plan.steps}
+    lease = lease or Lease(store.root, None)
     if scheduler:
-        return _on_cluster(plan, Context(store, Unwatched(), extras), watch, scheduler)
-    return _on_threads(plan, store, watch, extras, workers or os.cpu_count() or 1)
+        return _on_cluster(plan, Context(store, Unwatched(), extras, Claims(lease)), watch, scheduler)
+    threads = workers or os.cpu_count() or 1
+    return _on_threads(plan, Context(store, watch, extras, LocalClaims(lease, store, threads)), threads)
 
 
 def _there(planned: Planned) -> Made:
     return Made(planned.step, str(planned.key), str(planned.digest), planned.seconds or 0.0, reused=True)
 
 
-def _on_threads(plan: Plan, store: Store, watch: Watch, extras: Mapping[str, Any], workers: int) -> dict[str, Made]:
+def _on_threads(plan: Plan, context: Context, threads: int) -> dict[str, Made]:
     import dask
 
-    drafts = _Drafts(watch)
-    results, _ = _graph(plan, Context(store, drafts, extras))
-    pool = ThreadPoolExecutor(workers)
+    drafts = _Drafts(context.watch)
+    results, _ = _graph(plan, replace(context, watch=drafts))
+    pool = ThreadPoolExecutor(threads)
     try:
         made: Sequence[Made] = dask.compute(*results, scheduler="threads", pool=pool)
     except Exception:
         # The failed task's siblings go on for a while: what they write must not outlive the drafts.
+        context.claims.stop()
         pool.shutdown(wait=True, cancel_futures=True)
         raise
     finally:
+        context.claims.stop()
         drafts.discard()
+        context.claims.close()
         pool.shutdown(wait=False, cancel_futures=True)
     return {each.step.id: each for each in made}
 
@@ -150,6 +159,9 @@ class _Drafts:
     def begun(self, step: Step, draft: Draft, tiles: int) -> None:
         self._open[step.id] = draft
         self._watch.begun(step, draft, tiles)
+
+    def waiting(self, step: Step, holder: str) -> None:
+        self._watch.waiting(step, holder)
 
     def advanced(self, step: Step, done: int, total: int, note: str) -> None:
         self._watch.advanced(step, done, total, note)

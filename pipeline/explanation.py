@@ -2,11 +2,15 @@
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
 from cache import Entry, Store
+from pipeline.ancestry import ancestry, tree_lines
+from pipeline.console import why
+from pipeline.errors import UsageError
 from pipeline.plan import Planned
 
 
@@ -14,8 +18,9 @@ def explanation(planned: Planned, store: Store) -> dict[str, Any]:
     """Return a product's ingredients: its recipe if the key is known, its own part of it if inputs are not there yet.
 
     Returns:
-        ``product``, ``scene``, ``state``, ``key``, ``changed``, ``recipe``; of a hit also ``digest``,
-        ``created``, ``seconds``, ``bytes`` and ``extras`` (versions, command line, configuration).
+        ``product``, ``scene``, ``state``, ``key``, ``changed``, ``why``, ``recipe``; of a hit also ``digest``,
+        ``created``, ``seconds``, ``bytes``, ``extras`` (versions, command line, configuration), ``provenance``
+        (all it was made from, nearest first) and ``tree`` (the same as lines of text).
     """
     step = planned.step
     found: dict[str, Any] = {
@@ -24,12 +29,30 @@ def explanation(planned: Planned, store: Store) -> dict[str, Any]:
         "state": planned.state,
         "key": planned.key,
         "changed": [{"field": change.field, "old": change.old, "new": change.new} for change in planned.changed],
+        "why": why(planned),
     }
     entry = store.find(planned.key) if planned.key else None
     if entry is None:
         own = {"stage": step.product, "code": step.code, "params": step.settings, "environment": step.environment}
         return found | {"recipe": own | {"inputs": dict.fromkeys(step.inputs, "open")}}
-    return found | _of_entry(entry)
+    chain = ancestry(store, entry.key)
+    return (
+        found | _of_entry(entry) | {"provenance": [each.to_dict() for each in chain], "tree": list(tree_lines(chain))}
+    )
+
+
+def draw_provenance(planned: Planned, store: Store, path: Path) -> None:
+    """Draw what a product was made from.
+
+    Raises:
+        UsageError: if it is not cached, or the file cannot be written.
+    """
+    if planned.state != "hit" or planned.key is None:
+        name, product = planned.step.name, planned.step.product
+        raise UsageError(f"{name} is not cached ({why(planned)}): make it with `pipeline run --upto {product}`")
+    from pipeline.views.provenance import save_graph
+
+    save_graph(ancestry(store, planned.key), path)
 
 
 def _of_entry(entry: Entry) -> dict[str, Any]:
@@ -51,12 +74,18 @@ def print_explanation(found: Mapping[str, Any]) -> None:
     if "digest" in found:
         made = f"made {found['created']} in {found['seconds']:.2f} s, {found['bytes']:,} bytes"
         console.print(f"digest  {found['digest']}\n{made}")
+    if found["why"]:
+        console.print(f"why     {found['why']}", style="yellow", markup=False)
     for change in found["changed"]:
         console.print(f"changed {change['field']}: {change['old']} -> {change['new']}", style="yellow", markup=False)
     for part in ("params", "inputs", "environment", "code"):
         console.print(f"\n{part}", style="bold")
         for name, value in found["recipe"][part].items():
             console.print(f"  {name} = {_short(value)}", markup=False)
+    if "tree" in found:
+        console.print("\nmade from", style="bold")
+        for line in found["tree"][1:]:
+            console.print(line, markup=False)
 
 
 def _short(value: object) -> str:

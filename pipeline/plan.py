@@ -13,11 +13,10 @@ from typing import Literal
 from cache import ABSENT, Change, Entry, Recipe, Store, differences
 from pipeline.config import nearest
 from pipeline.errors import UsageError
-from pipeline.steps import PRODUCTS, Request, Step, build
+from pipeline.reasons import PENDING, Causes
+from pipeline.steps import PRODUCTS, Graph, Request, Step, build
 
 State = Literal["hit", "made", "stale", "missing"]
-PENDING = "to be made again"
-"""Stands in a ``Change`` for the digest of an input that is to be made before the step."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +30,7 @@ class Planned:
         key: of its result; None while it is open.
         digest: of its content; None unless it is there.
         changed: what differs from the nearest earlier result of the same product and scene.
+        causes: what that comes from, a line each: the setting, function, file or weights that changed.
         damage: what is wrong with an entry that is there and cannot be used.
         seconds: what making it took, if it is there.
     """
@@ -42,6 +42,7 @@ class Planned:
     changed: tuple[Change, ...] = ()
     damage: str | None = None
     seconds: float | None = None
+    causes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,11 @@ def make_plan(request: Request, store: Store, forced: Iterable[str] = ()) -> Pla
     unknown = sorted(set(forced) - set(PRODUCTS))
     if unknown:
         raise UsageError(f"no product {unknown[0]!r} to force; {nearest(unknown[0], PRODUCTS)}")
-    graph = build(request)
+    return plan_graph(build(request), store, forced)
+
+
+def plan_graph(graph: Graph, store: Store, forced: Iterable[str] = ()) -> Plan:
+    """Return the plan of steps that are known already; as ``make_plan`` otherwise."""
     planner = _Planner(store, frozenset(forced))
     planned = tuple(planner.look_at(step) for step in graph.steps.values())
     return Plan(planned, tuple(graph.targets), tuple(graph.notes), planner.forced)
@@ -94,6 +99,8 @@ class _Planner:
         self.forced = forced
         self.digests: dict[str, str] = {}
         self._history: dict[tuple[tuple[str, str], ...], list[Entry]] | None = None
+        self._reasons: Causes | None = None
+        self._causes: dict[str, tuple[str, ...]] = {}
 
     def look_at(self, step: Step) -> Planned:
         """Return the step with its state."""
@@ -115,7 +122,9 @@ class _Planner:
         self, step: Step, recipe: Recipe | None, changed: tuple[Change, ...], damage: str | None = None
     ) -> Planned:
         state: State = "stale" if self._earlier(step) else "missing"
-        return Planned(step, state, recipe.key if recipe else None, changed=changed, damage=damage)
+        causes = self._reasons.of(step, changed, self._causes) if self._reasons and not damage else ()
+        self._causes[step.id] = causes
+        return Planned(step, state, recipe.key if recipe else None, changed=changed, damage=damage, causes=causes)
 
     def _changes(self, step: Step, recipe: Recipe) -> tuple[Change, ...]:
         """Return how a recipe differs from the nearest earlier one of the same label."""
@@ -135,7 +144,9 @@ class _Planner:
         """Return the results of the same label, newest first; the cache is read once for all steps."""
         if self._history is None:
             self._history = {}
-            for entry in sorted(self.store.entries(), key=lambda entry: entry.created, reverse=True):
+            entries = sorted(self.store.entries(), key=lambda entry: entry.created, reverse=True)
+            self._reasons = Causes(self.store, entries)
+            for entry in entries:
                 self._history.setdefault(tuple(sorted(entry.label.items())), []).append(entry)
         return self._history.get(tuple(sorted(step.label.items())), [])
 

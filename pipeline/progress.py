@@ -60,6 +60,12 @@ class ProgressWatch:
             task = self._bars.add_task(step.name, total=tiles, note="")
             self._rows[step.id] = _Row(int(task), time.monotonic())
 
+    def waiting(self, step: Step, holder: str) -> None:
+        """Say that another process is making the product."""
+        self._console.print(
+            f"{step.name}: waiting for {holder}, which is making it", highlight=False, soft_wrap=True, markup=False
+        )
+
     def advanced(self, step: Step, done: int, total: int, note: str) -> None:
         """Move the bar: a tile counts one, a monitored stage says where it is."""
         with self._lock:

@@ -6,16 +6,17 @@ writes what it makes into its draft, in whichever process it runs.
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, Protocol
 
 import numpy as np
 
-from cache import Draft, Entry, Store
+from cache import DamagedEntry, Draft, Entry, EntryNotFound, Recipe, Store
 from pipeline.checkpoints import Checkpoints
-from pipeline.errors import USER_ERRORS, StageFailed, StageRefused
+from pipeline.claims import Claims
+from pipeline.errors import DISK_ERRNOS, USER_ERRORS, StageFailed, StageRefused
 from pipeline.steps import Step
 from pipeline.tiles import Rows, read_block, trim
 from stages.stage import Array, Arrays, Output
@@ -28,6 +29,9 @@ class Watch(Protocol):
 
     def begun(self, step: Step, draft: Draft, tiles: int) -> None:
         """A product is being made in ``draft``, in so many tiles."""
+
+    def waiting(self, step: Step, holder: str) -> None:
+        """Another process is making the product: this run waits for it."""
 
     def advanced(self, step: Step, done: int, total: int, note: str) -> None:
         """A tile, or a training step, is done."""
@@ -42,6 +46,9 @@ class Unwatched:
     def begun(self, step: Step, draft: Draft, tiles: int) -> None:
         """See nothing."""
 
+    def waiting(self, step: Step, holder: str) -> None:
+        """See nothing."""
+
     def advanced(self, step: Step, done: int, total: int, note: str) -> None:
         """See nothing."""
 
@@ -51,11 +58,12 @@ class Unwatched:
 
 @dataclass(frozen=True)
 class Context:
-    """What every task is given: the cache, who watches, and what is stored beside each result."""
+    """What every task is given: the cache, who watches, what is stored beside each result, and who makes what."""
 
     store: Store
     watch: Watch
     extras: Mapping[str, Any]
+    claims: Claims
 
 
 @dataclass(frozen=True)
@@ -92,23 +100,45 @@ def begin(context: Context, step: Step, inputs: Sequence[Made], forced: bool, ti
     recipe = step.recipe({step_id: made.digest for step_id, made in by_id.items()})
     keys = {product: tuple(by_id[each].key for each in ids) for product, ids in step.inputs.items()}
     with explained(step):
-        if not forced and context.store.find(recipe.key) and context.store.check(recipe.key) is None:
-            return Job(step, keys, None, _made(step, context.store.require(recipe.key), reused=True))
-        _set_damaged_aside(context.store, recipe.key)
-        draft = context.store.begin(recipe, step.label)
+        if not forced and (made := _find(context.store, step, recipe)):
+            context.claims.lease.add([recipe.key])
+            return Job(step, keys, None, made)
+        context.claims.take(recipe.key, lambda holder: context.watch.waiting(step, holder))
+        try:
+            return _begin_claimed(context, step, recipe, keys, forced, tiles)
+        except BaseException:
+            context.claims.release(recipe.key)
+            raise
+
+
+def _begin_claimed(
+    context: Context, step: Step, recipe: Recipe, keys: Mapping[str, tuple[str, ...]], forced: bool, tiles: int
+) -> Job:
+    """Look again, now that nobody else makes the product, and begin a draft."""
+    if not forced and (made := _find(context.store, step, recipe)):
+        context.claims.release(recipe.key)
+        return Job(step, keys, None, made)
+    _set_damaged_aside(context.store, recipe.key)
+    draft = context.store.begin(recipe, step.label)
     context.watch.begun(step, draft, tiles)
     return Job(step, keys, draft, None)
+
+
+def _find(store: Store, step: Step, recipe: Recipe) -> Made | None:
+    """Return a step's result if it is there and sound."""
+    if store.find(recipe.key) is None or store.check(recipe.key) is not None:
+        return None
+    try:
+        return _made(step, store.require(recipe.key), reused=True)
+    except (EntryNotFound, DamagedEntry):  # it went between two looks
+        return None
 
 
 def _set_damaged_aside(store: Store, key: str) -> None:
     """Move a damaged entry out of the way, so that the new one is not taken for a second writer's."""
     if store.find(key) and store.check(key):
-        from cache import DamagedEntry
-
-        try:
+        with suppress(DamagedEntry, EntryNotFound):
             store.require(key)
-        except DamagedEntry:
-            return
 
 
 def make_tile(context: Context, job: Job, rows: Rows) -> None:
@@ -182,8 +212,11 @@ def publish(context: Context, job: Job, _: Sequence[None]) -> Made:
         made = job.made
     else:
         with explained(job.step):
-            entry = job.draft.publish(time.time() - job.draft.started, context.extras)
-            Checkpoints(context.store.root, entry.key).remove()
+            try:
+                entry = job.draft.publish(time.time() - job.draft.started, context.extras)
+                Checkpoints(context.store.root, entry.key).remove()
+            finally:
+                context.claims.release(job.draft.recipe.key)
         made = _made(job.step, entry, reused=False)
     context.watch.published(made)
     return made
@@ -241,4 +274,5 @@ def explained(step: Step, where: str = "") -> Iterator[None]:
     except Exception as error:
         place = f"{step.name}, {where}" if where else step.name
         message = f"{place}: {error}" if str(error) else f"{place}: {type(error).__name__}"
-        raise (StageRefused if isinstance(error, USER_ERRORS) else StageFailed)(message) from error
+        disk = isinstance(error, OSError) and error.errno in DISK_ERRNOS
+        raise (StageRefused if disk or isinstance(error, USER_ERRORS) else StageFailed)(message) from error

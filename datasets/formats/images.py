@@ -7,6 +7,7 @@ not count.
 
 import os
 import struct
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +20,9 @@ from PIL.ImageFile import ImageFile
 from datasets.arrays import ImageArray
 from datasets.errors import ImageError, MissingFileError
 from datasets.formats.limits import check_pixels
+
+# The size is judged by `check_pixels`, in one line; Pillow's warning would be a second one.
+warnings.filterwarnings("ignore", category=Image.DecompressionBombWarning)
 
 _Pixels: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.integer]]
 _FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "PPM")

@@ -8,35 +8,17 @@ import pytest
 
 from cache import DamagedEntry, Entry, Recipe, Store
 from cache.check import SETTLED, Policy, _hashed
-from cache.document import seal, unseal
 from cache.files import walk
-
-
-def overwrite(path: Path, data: bytes) -> None:
-    path.chmod(0o600)
-    path.write_bytes(data)
-
-
-def files_of(store: Store, key: str) -> dict[str, Path]:
-    folder = store.layout.entry(key)
-    files = {path: folder / path for path, thing in walk(folder) if thing.is_file()}
-    return {**files, "record": store.layout.record(key)}
+from tests.faults.damage import DAMAGE, Damage, chunk, files_of, flips, overwrite, unlock
 
 
 def test_a_flipped_bit_at_every_offset_is_found(store: Store, make: Callable[..., Entry], recipe: Recipe) -> None:
     make(store)
     trials = 0
     for name, path in files_of(store, recipe.key).items():
-        good = path.read_bytes()
-        path.chmod(0o600)
-        for offset in range(len(good)):
-            bad = bytearray(good)
-            bad[offset] ^= 1 << offset % 8
-            with path.open("r+b") as file:
-                file.write(bad)
+        for offset in flips(path):
             assert store.check(recipe.key) is not None, f"{name} at {offset}"
             trials += 1
-        overwrite(path, good)
         assert store.check(recipe.key) is None
     assert trials > 2000
 
@@ -63,79 +45,7 @@ def test_a_flipped_bit_in_a_chunk_never_reads_as_another_value_even_unchecked(
     assert refused > len(good) // 2
 
 
-Damage = Callable[[Path, Path], None]
-"""Does something to an entry's folder and record."""
-
-
-def _chunk(folder: Path, number: int = 0) -> Path:
-    return folder / f"data.zarr/map/c/{number}/0"
-
-
-def _swap(folder: Path, _: Path) -> None:
-    _chunk(folder).rename(folder / "x")
-    _chunk(folder, 1).rename(_chunk(folder))
-    (folder / "x").rename(_chunk(folder, 1))
-
-
-def _link(folder: Path, _: Path) -> None:
-    shutil.copy(_chunk(folder), folder.parent / "copy")
-    _chunk(folder).unlink()
-    _chunk(folder).symlink_to(folder.parent / "copy")
-
-
-def _link_folder(folder: Path, _: Path) -> None:
-    shutil.copytree(folder / "data.zarr/map", folder.parent / "copy")
-    shutil.rmtree(folder / "data.zarr/map")
-    (folder / "data.zarr/map").symlink_to(folder.parent / "copy")
-
-
-def _link_entry(folder: Path, _: Path) -> None:
-    folder.rename(folder.with_name("copy"))
-    folder.symlink_to(folder.with_name("copy"))
-
-
-def _fifo(folder: Path, _: Path) -> None:
-    _chunk(folder).unlink()
-    os.mkfifo(_chunk(folder))
-
-
-def _manifest_with_its_own_checksum(folder: Path, _: Path) -> None:
-    path = folder / "manifest.json"
-    rows = unseal("manifest", path.read_bytes())["files"]
-    overwrite(path, seal("manifest", {"files": rows[1:]}))
-    _chunk(folder).unlink()
-    _chunk(folder).parent.rmdir()
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [
-        pytest.param(lambda f, r: overwrite(_chunk(f), _chunk(f).read_bytes()[:-1]), id="truncated chunk"),
-        pytest.param(lambda f, r: overwrite(_chunk(f), b""), id="empty chunk"),
-        pytest.param(lambda f, r: overwrite(_chunk(f), _chunk(f).read_bytes() + b"\0"), id="appended to a chunk"),
-        pytest.param(lambda f, r: _chunk(f).unlink(), id="deleted chunk"),
-        pytest.param(lambda f, r: shutil.copy(_chunk(f), _chunk(f).with_name("1")), id="extra chunk"),
-        pytest.param(lambda f, r: (f / "notes").write_text("x"), id="extra file"),
-        pytest.param(lambda f, r: (f / "data.zarr/empty").mkdir(), id="extra folder"),
-        pytest.param(lambda f, r: (f / "data.zarr/here").symlink_to("/"), id="extra link"),
-        pytest.param(_swap, id="swapped chunks of different size"),
-        pytest.param(_link, id="link to the very same bytes"),
-        pytest.param(_link_folder, id="link to the very same folder"),
-        pytest.param(_link_entry, id="link in place of the entry"),
-        pytest.param(_fifo, id="a pipe, which would wait for ever"),
-        pytest.param(lambda f, r: (f / "manifest.json").unlink(), id="no manifest"),
-        pytest.param(lambda f, r: overwrite(f / "manifest.json", b""), id="empty manifest"),
-        pytest.param(_manifest_with_its_own_checksum, id="manifest and files edited alike"),
-        pytest.param(lambda f, r: f.rename(f.with_name("gone")), id="no entry"),
-        pytest.param(lambda f, r: overwrite(r, r.read_bytes()[:-1]), id="truncated record"),
-        pytest.param(lambda f, r: overwrite(r, bytes(len(r.read_bytes()))), id="zeroed record"),
-        pytest.param(lambda f, r: overwrite(r, r.read_bytes().replace(b"Teddy", b"Cones")), id="edited label"),
-        pytest.param(lambda f, r: overwrite(r, r.read_bytes().replace(b'mat": 1', b'mat": 2')), id="newer format"),
-        pytest.param(lambda f, r: overwrite(r, r.read_bytes().replace(b'mat": 1', b'mat": 0')), id="older format"),
-        pytest.param(lambda f, r: (r.rename(f.parent / "r"), r.symlink_to(f.parent / "r")), id="record is a link"),
-        pytest.param(lambda f, r: (r.unlink(), r.mkdir()), id="record is a folder"),
-    ],
-)
+@pytest.mark.parametrize("damage", [pytest.param(each, id=name) for name, each in DAMAGE.items()])
 def test_damage_is_found_set_aside_and_made_again(
     store: Store,
     make: Callable[..., Entry],
@@ -146,6 +56,7 @@ def test_damage_is_found_set_aside_and_made_again(
     first = make(store)
     store = Store(store.root, "size")  # all that this finds, the full check finds: it begins the same way
     assert store.require(recipe.key) == first
+    unlock(store, recipe.key)
     damage(store.layout.entry(recipe.key), store.layout.record(recipe.key))
     before = sorted(path for path, _ in walk(store.root))
     said = store.check(recipe.key)
@@ -163,7 +74,7 @@ def test_damage_is_found_set_aside_and_made_again(
 
 def test_same_sized_damage_is_found_by_the_full_check(store: Store, make: Callable[..., Entry], recipe: Recipe) -> None:
     make(store)
-    path = _chunk(store.layout.entry(recipe.key))
+    path = chunk(store.layout.entry(recipe.key))
     overwrite(path, bytes(path.stat().st_size))
     assert Store(store.root, "size").check(recipe.key) is None
     assert "are not those that were written" in str(store.check(recipe.key))
@@ -233,7 +144,7 @@ def test_a_changed_file_is_read_again_though_its_times_are_put_back(
     make(store)
     _age(store, recipe.key, monkeypatch)
     store.require(recipe.key)
-    path = _chunk(store.layout.entry(recipe.key))
+    path = chunk(store.layout.entry(recipe.key))
     times = path.stat().st_mtime_ns
     overwrite(path, bytes(path.stat().st_size))
     os.utime(path, ns=(times, times))
@@ -241,9 +152,11 @@ def test_a_changed_file_is_read_again_though_its_times_are_put_back(
 
 
 def test_a_file_of_just_now_is_not_remembered(
-    store: Store, make: Callable[..., Entry], recipe: Recipe, hashes: list[Path]
+    store: Store, make: Callable[..., Entry], recipe: Recipe, hashes: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     make(store)
+    published = store.layout.entry(recipe.key).stat().st_ctime
+    monkeypatch.setattr("cache.check.time.time", lambda: published)
     store.require(recipe.key)
     assert len(hashes) == 4
     store.require(recipe.key)

@@ -53,11 +53,10 @@ def test_dies_with_its_process(tmp_path: Path, run_script: Callable[..., str]) -
     run_script(
         """
 def work():
-    with Store(sys.argv[1]).lock("0" * 64):
-        die()
+    assert Store(sys.argv[1]).claim("0" * 64)
+    die()
 assert code(in_child(work)) == -signal.SIGKILL
-with Store(sys.argv[1]).lock("0" * 64):
-    pass
+assert Store(sys.argv[1]).claim("0" * 64)
 """,
         tmp_path,
     )

@@ -40,7 +40,7 @@ def test_what_was_published_is_found(store: Store, make: Callable[..., Entry], r
     "key", ["", "x", "../" * 20, "A" * 64, "0" * 63, "0" * 65, "0" * 64 + "\n", "/etc/passwd", "\u0660" * 64]
 )
 def test_keys_are_never_paths(store: Store, key: str) -> None:
-    for ask in (store.find, store.check, store.require, store.open, store.lock):
+    for ask in (store.find, store.check, store.require, store.open, store.claim, store.claimant):
         with pytest.raises(InvalidKey, match="is not a key"):
             ask(key)
 
@@ -197,7 +197,7 @@ from cache import CacheError
 store = Store(sys.argv[1])
 print("root still" if os.access(sys.argv[1], os.W_OK) else "ordinary")
 print(store.open(recipe.key)["map"].values[1, 1])
-for attempt in (lambda: make(sys.argv[1]), lambda: store.lock(recipe.key).__enter__()):
+for attempt in (lambda: make(sys.argv[1]), lambda: store.claim(recipe.key)):
     try:
         attempt()
     except CacheError as error:

@@ -3,7 +3,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from pipeline.api import Result
-from pipeline.cachetools import _age, bytes_text, list_entries, verify_entries
+from pipeline.cachetools import Selection, _age, bytes_text, list_entries, verify_entries
 
 
 @pytest.mark.parametrize(
@@ -33,12 +33,13 @@ def test_ages_are_for_people(seconds: int, text: str) -> None:
 
 
 def test_entries_are_listed_oldest_first(trained: Result, capsys: pytest.CaptureFixture[str]) -> None:
-    list_entries(trained.store.root, as_json=False)
+    list_entries(trained.store.root, Selection(), as_json=False)
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert lines[0][:4] == ["product", "dataset", "scene", "size"]
-    assert lines[-1][0] == "metrics"
+    assert lines[-2][0] == "metrics"
+    assert lines[-1][1] == "entries,"
 
 
 def test_a_sound_cache_is_said_to_be(trained: Result, capsys: pytest.CaptureFixture[str]) -> None:
-    assert verify_entries(trained.store.root, as_json=False)
+    assert verify_entries(trained.store.root, Selection(), as_json=False)
     assert capsys.readouterr().out == f"{len(list(trained.store.entries()))} sound, 0 damaged, 0 in quarantine\n"

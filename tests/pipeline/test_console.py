@@ -6,7 +6,8 @@ import pytest
 
 from cache import ABSENT, Change
 from pipeline import console
-from pipeline.plan import PENDING, Plan, Planned
+from pipeline.plan import Plan, Planned
+from pipeline.reasons import PENDING
 from pipeline.tasks import Made
 from tests.pipeline.toy import RAMP, SUM, step
 

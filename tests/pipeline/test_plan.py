@@ -11,7 +11,8 @@ from cache import Store
 from pipeline import api, steps
 from pipeline.api import Result, Task
 from pipeline.errors import UsageError
-from pipeline.plan import PENDING, Plan
+from pipeline.plan import Plan
+from pipeline.reasons import PENDING
 from pipeline.steps import Request
 from pipeline.tasks import Made
 from tests.pipeline.toy import CALLS, chain, changes, states

@@ -6,10 +6,11 @@ import cloudpickle
 import numpy as np
 import pytest
 
-from cache import CacheUnavailable, Draft, Store
+from cache import CacheUnavailable, Draft, Lease, Store
 from datasets import DatasetError
 from pipeline import tasks
 from pipeline.checkpoints import Checkpoints
+from pipeline.claims import Claims
 from pipeline.errors import StageFailed, StageRefused, UsageError
 from pipeline.steps import Step
 from pipeline.tasks import Context, Job, Made, Unwatched
@@ -42,7 +43,7 @@ def seen() -> Seen:
 
 @pytest.fixture
 def context(store: Store, seen: Seen) -> Context:
-    return Context(store, seen, {"by": "test"})
+    return Context(store, seen, {"by": "test"}, Claims(Lease(store.root, None)))
 
 
 def whole(context: Context, each: Step, *inputs: Made, forced: bool = False) -> Made:
@@ -149,12 +150,12 @@ def test_a_job_without_draft_and_result_is_a_fault(context: Context) -> None:
 def test_what_travels_between_tasks_can_be_pickled(context: Context) -> None:
     made = whole(context, step(RAMP, 0))
     job = Job(made.step, {"ramp": (made.key,)}, context.store.begin(made.step.recipe({}), made.step.label), made)
-    for thing in (made, job, Context(context.store, Unwatched(), {})):
+    for thing in (made, job, Context(context.store, Unwatched(), {}, context.claims)):
         assert type(pickle.loads(cloudpickle.dumps(thing))) is type(thing)
 
 
 def test_an_unwatched_run_is_told_everything_and_says_nothing(store: Store, capsys: pytest.CaptureFixture[str]) -> None:
-    whole(Context(store, Unwatched(), {}), step(RAMP, 0))
+    whole(Context(store, Unwatched(), {}, Claims(Lease(store.root, None))), step(RAMP, 0))
     assert capsys.readouterr() == ("", "")
 
 

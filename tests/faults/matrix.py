@@ -1,0 +1,89 @@
+"""The fault matrix: its rows, how they are run, and how the table is printed."""
+
+import logging
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tests.faults import inputs, keys, machine, processes, storage
+from tests.faults.tally import Tally
+
+PROMISED = 5000
+"""Faults and bad inputs that the large form injects at least."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row: what is done, and how large the quick form is next to the large one."""
+
+    number: int
+    title: str
+    inject: Callable[[float], Tally]
+    quick: float
+
+
+ROWS = (
+    Row(1, "kill -9 at every step of publishing, every kind of product", processes.kill_at_steps, 0.1),
+    Row(2, "kill -9 at random times, also of the real pipeline", processes.kill_at_random, 0.1),
+    Row(3, "SIGINT and SIGTERM in the middle of a stage", processes.signals, 0.17),
+    Row(4, "a stage raises in one tile", processes.failing_stages, 0.5),
+    Row(5, "disk full, files too large, no permission", processes.bad_disks, 0.1),
+    Row(6, "a bit flipped at every offset of an entry", storage.flipped_bytes, 0.1),
+    Row(
+        7,
+        "files truncated, zeroed, deleted, swapped, linked; entries copied; other formats",
+        storage.damaged_files,
+        0.1,
+    ),
+    Row(8, "many processes on the same keys, with gc and verify", processes.crowds, 0.1),
+    Row(9, "settings, input bytes and source tokens changed", keys.changed_ingredients, 0.1),
+    Row(10, "random sequences of run, sweep, damage, kill, gc, verify", machine.random_sequences, 0.05),
+    Row(11, "bad images", inputs.bad_images, 0.1),
+    Row(12, "bad maps, calibrations, configurations, weights, archives", inputs.bad_files, 0.1),
+)
+COLUMNS = ("injected", "wrong", "lost", "leftovers", "tracebacks")
+HEADINGS = ("faults", "wrong results", "lost products", "leftovers", "tracebacks")
+
+
+def run_row(row: Row, scale: float) -> dict[str, Any]:
+    """Run a row and return its counts."""
+    logging.getLogger("cache").setLevel(logging.ERROR)  # what is set aside is expected here
+    started = time.monotonic()
+    try:
+        tally = row.inject(scale)
+    finally:
+        logging.getLogger("cache").setLevel(logging.NOTSET)
+    about = {"row": row.number, "title": row.title, "seconds": round(time.monotonic() - started, 1)}
+    return about | tally.to_dict()
+
+
+def total(rows: Iterable[Mapping[str, Any]]) -> dict[str, int]:
+    """Return the sum of each column."""
+    rows = list(rows)
+    return {name: sum(row[name] for row in rows) for name in COLUMNS}
+
+
+def markdown(rows: Iterable[Mapping[str, Any]]) -> str:
+    """Return the table, as the documentation quotes it."""
+    rows = list(rows)
+    lines = [f"| # | fault | {' | '.join(HEADINGS)} |", "|---|---|" + "---:|" * len(HEADINGS)]
+    for row in rows:
+        counts = " | ".join(f"{row[name]:,}" for name in COLUMNS)
+        lines.append(f"| {row['row']} | {row['title']}{_figures(row)} | {counts} |")
+    counts = " | ".join(f"**{count:,}**" for count in total(rows).values())
+    return "\n".join([*lines, f"| | **together** | {counts} |"])
+
+
+def _figures(row: Mapping[str, Any]) -> str:
+    told = ", ".join(f"{name} {count:,}" for name, count in row["figures"].items())
+    return f" ({told})" if told else ""
+
+
+def summary(rows: Iterable[Mapping[str, Any]]) -> str:
+    """Return one line with the counts, as the README quotes it."""
+    counts = total(rows)
+    return (
+        f"`make faults` injects {counts['injected']:,} faults and bad inputs: {counts['wrong']:,} wrong results, "
+        f"{counts['lost']:,} lost products, {counts['leftovers']:,} leftovers, {counts['tracebacks']:,} tracebacks."
+    )
