@@ -40,8 +40,14 @@ def _draw_matches(
     extent = (-0.5, view.shape[1] * step - 0.5, view.shape[0] * step - 0.5, -0.5)
     axes.imshow(view // 2 + 64, cmap="gray", vmin=0, vmax=255, extent=extent)
     values = matches[name]
-    reach = max(_LEAST_SPAN, float(np.abs(values).max(initial=0)))
-    low, high = (-reach, reach) if name == "vertical" else (None, None)
+    low, high = _span(values, centred=name == "vertical")
     dots = axes.scatter(matches["x"], matches["y"], c=values, s=6, cmap=colours, vmin=low, vmax=high)
     label = {"disparity": "disparity (px)", "vertical": "vertical offset, right minus left (px)"}[name]
     axes.figure.colorbar(dots, cax=axes.inset_axes((1.02, 0, 0.035, 1)), label=label)
+
+
+def _span(values: NDArray[np.float32], centred: bool) -> tuple[float, float]:
+    """Return the values of the first and last colour; one in a hundred at each end may lie beyond."""
+    low, high = np.percentile(values, (1, 99)) if values.size else (0.0, 1.0)
+    reach = max(_LEAST_SPAN, abs(low), abs(high))
+    return (-reach, reach) if centred else (float(low), float(high))
