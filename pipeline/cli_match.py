@@ -116,7 +116,8 @@ def _say(match: "Match", about: dict[str, Any]) -> None:
     low, high = match.disparities.minimum, match.disparities.maximum
     ends = " (estimated from the images)" if match.scene.open_ends else ""
     print(f"{match.scene.name}: {about['rows']} x {about['columns']} px, disparities {low} to {high} px{ends}")
-    print(f"  kept {about['density_percent']:.1f} % of the pixels at R = {match.R:.3g}, {about['R_from']}")
+    kept = about["density_percent"] - about["guessed_percent"]
+    print(f"  kept {kept:.1f} % of the pixels, at R = {match.R:.3g} ({about['R_from']})")
     if match.wishes.fill:
         print(f"  {about['guessed_percent']:.1f} % are filled in: guesses (guessed.png)")
     for note in about["notes"]:
@@ -125,8 +126,12 @@ def _say(match: "Match", about: dict[str, Any]) -> None:
 
 
 def _results(found: "Sequence[Match]") -> list[Any]:
-    runs = [found[0].result, *found[0].others]
-    return list({made.key: made for run in runs for made in run.made.values()}.values())
+    """Return every result once, as it was first met: a later run only finds again what an earlier one made."""
+    first: dict[str, Any] = {}
+    for run in (found[0].others[0], found[0].result, *found[0].others[1:]):
+        for made in run.made.values():
+            first.setdefault(made.key, made)
+    return list(first.values())
 
 
 def _share(text: str | None) -> float | None:

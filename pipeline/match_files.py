@@ -159,7 +159,7 @@ def summary(match: Match) -> dict[str, Any]:
         "reference_view": "left",
         "disparities": asdict(match.disparities) | {"estimated": list(match.scene.open_ends)},
         "R": match.R,
-        "R_from": "the pair's own confidences, for the density asked for" if wishes.density else "the value asked for",
+        "R_from": "from the pair's own confidences, for the density asked for" if wishes.density else "as set",
         "wishes": asdict(wishes),
         "density_percent": 100 * match.density,
         "guessed_percent": 100 * float(match.guessed.mean()),
