@@ -3,8 +3,8 @@
     python -m benchmarks.against_sgbm DATASET [--scene NAME]... [--R 0.9] [--set K=V]... [--cache DIR] [--json FILE]
 
 A line a scene: density and error of reported pixels (> 1 px, mask nonocc) of SGBM; the same of this project at R, and
-at SGBM's density, by its most confident pixels. Both search the scene's own range. SGBM: 8 paths, left-right check 1 px,
-uniqueness 10. Densities are shares of the mask.
+at SGBM's density, by its most confident pixels. Both search the scene's own range. SGBM: 8 paths, left-right check
+1 px, uniqueness 10. Densities are shares of the mask.
 """
 
 import json

@@ -19,7 +19,7 @@ def pair(make_pair: Callable[[Path], Path], tmp_path: Path) -> Path:
     return make_pair(tmp_path / "pair")
 
 
-def test_one_command_from_two_files_to_a_folder(invoke: Invoke, weights: Path, pair: Path, tmp_path: Path) -> None:
+def test_one_command_from_two_files_to_a_folder(invoke: Invoke, pair: Path, tmp_path: Path) -> None:
     arguments = ["match", pair / "im0.png", pair / "im1.png", "--calib", pair / "calib.txt", "--density", "50%"]
     ran = invoke(*arguments, "-o", tmp_path / "out", "--format", "pfm,png", "--cache", tmp_path / "cache")
     assert ran.code == 0, ran.err
@@ -73,7 +73,7 @@ GRAY = np.zeros((40, 48), np.uint8)
     ],
 )  # fmt: skip
 def test_a_bad_picture_is_one_line_and_leaves_nothing(
-    invoke: Invoke, weights: Path, pair: Path, tmp_path: Path, damage: Callable[[Path], object], words: list[str]
+    invoke: Invoke, pair: Path, tmp_path: Path, damage: Callable[[Path], object], words: list[str]
 ) -> None:
     damage(pair / "im1.png")
     refused(invoke, tmp_path, [pair / "im0.png", pair / "im1.png"], words)
@@ -97,7 +97,7 @@ def test_a_bad_picture_is_one_line_and_leaves_nothing(
     ],
 )  # fmt: skip
 def test_a_wrong_request_is_one_line_and_leaves_nothing(
-    invoke: Invoke, weights: Path, pair: Path, tmp_path: Path, given: list[str], words: list[str]
+    invoke: Invoke, pair: Path, tmp_path: Path, given: list[str], words: list[str]
 ) -> None:
     refused(invoke, tmp_path, [text.format(pair) for text in given], words)
 
