@@ -85,6 +85,9 @@ _BENCHMARKS = {
     "synthetic": _Benchmark(
         "synthetic[:KEY=VALUE,...]", "rendered planes with exact truth; see datasets.synthetic for the keys"
     ),
+    "pair": _Benchmark(
+        "pair:LEFT,RIGHT[,KEY=VALUE,...]", "your own: two files, folders or patterns, or pair:LIST.csv; see `match`"
+    ),
 }
 
 
@@ -92,7 +95,8 @@ def open_dataset(spec: str) -> Dataset:
     """List the scenes that a specification names; no pixel is decoded unless a range must be read from the truth.
 
     Args:
-        spec: ``motorcycle``, ``middlebury:DIR``, ``kitti2015:DIR``, ``eth3d:DIR`` or ``synthetic[:KEY=VALUE,...]``.
+        spec: ``motorcycle``, ``middlebury:DIR``, ``kitti2015:DIR``, ``eth3d:DIR``,
+            ``synthetic[:KEY=VALUE,...]`` or ``pair:LEFT,RIGHT[,KEY=VALUE,...]``.
 
     Raises:
         UnknownDatasetError: If the name before the colon is not known; the nearest one is given.

@@ -17,6 +17,7 @@ from datasets.arrays import DisparityMap, ImageArray, Mask
 from datasets.errors import DatasetError, MissingFileError
 
 Split: TypeAlias = Literal["train", "test"]
+RangeEnd: TypeAlias = Literal["minimum", "maximum"]
 Parameter: TypeAlias = bool | int | float | str | None
 MaskKind: TypeAlias = Literal["published", "left-right check", "warped truth", "exact", "non-occluded truth", "none"]
 
@@ -59,11 +60,13 @@ class Calibration:
         focal: Focal length in pixels, above 0.
         baseline: Distance between the two cameras in millimetres, above 0.
         doffs: Difference of the principal points' columns, right minus left, in pixels.
+        centre: Column and row of the left camera's principal point, in pixels; None if it is not known.
     """
 
     focal: float
     baseline: float
     doffs: float
+    centre: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         for name in ("focal", "baseline"):
@@ -72,6 +75,8 @@ class Calibration:
                 raise DatasetError(f"calibration: {name} is {value}; it must be finite and above 0")
         if not math.isfinite(self.doffs):
             raise DatasetError(f"calibration: doffs is {self.doffs}; it must be finite")
+        if self.centre is not None and not all(map(math.isfinite, self.centre)):
+            raise DatasetError(f"calibration: the principal point is {self.centre}; it must be finite")
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,6 +179,8 @@ class SceneSource:
         parameters: Whatever else the reader needs.
         has_truth: Whether a ground truth is there.
         calibration: What depth needs, or None.
+        open_ends: The ends of ``disparities`` that nobody knows: those hold the widest that the image allows, until
+            somebody estimates them.
     """
 
     name: str
@@ -186,6 +193,7 @@ class SceneSource:
     parameters: Mapping[str, Parameter] = field(default_factory=dict, hash=False)
     has_truth: bool = False
     calibration: Calibration | None = None
+    open_ends: tuple[RangeEnd, ...] = ()
 
     def load(self) -> Scene:
         """Read images and truth.

@@ -5,14 +5,21 @@ The verbs of the command line as functions; products come back as lazy xarray ob
     import pipeline
     run = pipeline.run("motorcycle")
     costs = run.open("costvolume", "Motorcycle")     # dims y, x, d; attrs tell where it comes from
+    found = pipeline.match("left.png", "right.png")  # your own pair: found.disparity, found.confidence
 """
 
 from importlib import import_module
 from typing import Any
 
-__all__ = ["Config", "Result", "Task", "explain", "export", "run", "status", "sweep"]
+__all__ = ["Config", "Match", "Result", "StereoMatcher", "Task", "explain", "export", "match", "run", "status", "sweep"]
 
-_HOMES = {"Config": "pipeline.config", "export": "pipeline.exporter"}
+_HOMES = {
+    "Config": "pipeline.config",
+    "Match": "pipeline.pairs",
+    "StereoMatcher": "pipeline.stereo_matcher",
+    "export": "pipeline.exporter",
+    "match": "pipeline.pairs",
+}
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cache import Store
-from datasets import SceneSource, open_dataset
+from datasets import Dataset, SceneSource, open_dataset
 from pipeline.attempts import attempt
 from pipeline.config import Config, parse_setting
 from pipeline.errors import UsageError
 from pipeline.plan import Plan, Planned, make_plan
+from pipeline.ranges import close_ranges
 from pipeline.steps import Request, training_scenes
 from pipeline.tasks import Made, Unwatched, Watch, provenance, read_arrays
 
@@ -42,7 +43,7 @@ class Task:
     """What a user asks for: the arguments that all verbs share.
 
     Attributes:
-        dataset: such as ``motorcycle`` or ``middlebury:DIR``; see ``datasets.describe``.
+        dataset: such as ``motorcycle`` or ``middlebury:DIR``, see ``datasets.describe``; or an opened one.
         scenes: names of scenes; none for all of the dataset.
         settings: ``section.field=value``, over the file's and the defaults.
         config: a TOML file.
@@ -50,7 +51,7 @@ class Task:
         cache: the cache's folder.
     """
 
-    dataset: str = "motorcycle"
+    dataset: str | Dataset = "motorcycle"
     scenes: Sequence[str] = ()
     settings: Sequence[str] = ()
     config: Path | None = None
@@ -64,7 +65,7 @@ class Task:
             UsageError, DatasetError: if it cannot be carried out as it stands.
         """
         configs = {", ".join(further): Config.load(self.config, [*self.settings, *further]) for further in variants}
-        whole = open_dataset(self.dataset)
+        whole = open_dataset(self.dataset) if isinstance(self.dataset, str) else self.dataset
         dataset = whole.select(self.scenes) if self.scenes else whole
         training: tuple[SceneSource, ...] = ()
         if self.train:
@@ -135,7 +136,8 @@ def open_product(store: Store, key: str) -> "xr.Dataset":
 def status(task: Task | str = "motorcycle", upto: str = "metrics", forced: Sequence[str] = ()) -> Plan:
     """Return the plan of a run: every step with its state. Nothing is made or changed."""
     task = Task(task) if isinstance(task, str) else task
-    return make_plan(task.request(upto), open_store(task.cache), forced)
+    store = open_store(task.cache)
+    return make_plan(close_ranges(task.request(upto), store), store, forced)
 
 
 def run(
@@ -175,8 +177,12 @@ def _run(
 ) -> Result:
     store = open_store(task.cache)
     extras = provenance(sys.argv, next(iter(request.configs.values())).model_dump(mode="json"))
-    planned = functools.partial(make_plan, request, store, forced)
-    plan, made = attempt(planned, store, watch or Unwatched(), extras, scheduler, workers)
+
+    def make(wanted: Request, forced: Iterable[str] = ()) -> tuple[Plan, dict[str, Made]]:
+        planned = functools.partial(make_plan, wanted, store, forced)
+        return attempt(planned, store, watch or Unwatched(), extras, scheduler, workers)
+
+    plan, made = make(close_ranges(request, store, lambda wanted: make(wanted)[1]), forced)
     return Result(plan, made, store, list(_metric_rows(plan, store, made)))
 
 
@@ -283,6 +289,8 @@ def explain(task: Task, product: str, scene: str | None = None) -> Planned:
     targets = dict(plan.targets)
     asked = [planned for planned in plan.steps if planned.step.id in targets and planned.step.product == product]
     found = [each for each in asked if scene in (None, each.step.scene, each.step.scene.rsplit("/", 1)[-1])]
+    if not asked and plan.notes:
+        raise UsageError(f"no {product} yet: {plan.notes[0]}")
     if len(found) != 1:
         names = ", ".join(each.step.scene for each in asked) or "none"
         raise UsageError(f"{product} of {scene or task.dataset}: {len(found)} scenes fit ({names}); name one")

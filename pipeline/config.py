@@ -16,6 +16,7 @@ from pipeline.errors import UsageError
 from stages.disparity_declaration import DisparityParams
 from stages.evaluation.declaration import ConfidenceParams, EvaluationNetParams, EvaluationSamplesParams
 from stages.filtering import SemidenseParams
+from stages.finishing.declaration import RefinedParams
 from stages.matching.declaration import CostVolumeParams, MatchingNetParams, MatchingSamplesParams
 from stages.stage import NoParams, Params
 from stages.transforms.declaration import ChannelsParams
@@ -44,6 +45,7 @@ class Config(BaseModel):
     evaluation_net: EvaluationNetParams = EvaluationNetParams()
     confidence: ConfidenceParams = ConfidenceParams()
     semidense: SemidenseParams = SemidenseParams()
+    refined: RefinedParams = RefinedParams()
 
     def section(self, product: str) -> Params:
         """Return the settings of a product; those of a product without any are empty."""

@@ -11,15 +11,13 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
 
-from pydantic import ValidationError
-
 from cache import Recipe, code_parts
 from datasets import Dataset, SceneSource
 from pipeline import shipped, sources
-from pipeline.config import Config, nearest, one_line
+from pipeline.config import Config, nearest
 from pipeline.errors import UsageError
+from pipeline.resolution import resolved
 from stages.catalog import STAGES
-from stages.precision import resolve
 from stages.stage import Params, Stage
 
 PACKAGES = ("pipeline", "stages", "datasets", "cache")
@@ -119,6 +117,7 @@ class Request:
         upto: the product to stop at.
         train: train the networks instead of taking the shipped weights.
         training: the scenes to train on; needed with ``train``.
+        notes: what a person should know of it.
     """
 
     dataset: Dataset
@@ -126,6 +125,7 @@ class Request:
     upto: str = "metrics"
     train: bool = False
     training: tuple[SceneSource, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a product that does not exist."""
@@ -140,7 +140,7 @@ def build(request: Request) -> Graph:
         UsageError: if there is nothing to do.
         StageError: if shipped weights are needed and there are none.
     """
-    graph = Graph()
+    graph = Graph(notes=list(request.notes))
     trained_on = {_identity(scene) for scene in request.training}
     for variant, config in request.configs.items():
         builder = _Builder(graph, config, request)
@@ -165,9 +165,22 @@ def _targets(builder: "_Builder", trained_on: set[str]) -> Iterator[str]:
             notes.append(f"{scene.name} is a training scene: it is left out, since nothing is tested on it")
         elif upto in ("truth", "metrics") and not scene.has_truth:
             notes.append(f"{scene.name} has no ground truth: there are no metrics for it")
-            yield builder.product("images" if upto == "truth" else "semidense", scene)
+            yield builder.product("images" if upto == "truth" else _known(scene, "semidense", notes), scene)
         else:
-            yield builder.product(upto, scene)
+            yield builder.product(_known(scene, upto, notes), scene)
+
+
+def needs_range(product: str) -> bool:
+    """Return whether a product of a scene is made from costs, for which its range of disparities must be known."""
+    return product != "truth" and PRODUCTS.index(product) >= PRODUCTS.index("costvolume")
+
+
+def _known(scene: SceneSource, product: str, notes: list[str]) -> str:
+    """Return the product, or the one to stop at while the scene's range is open."""
+    if not (scene.open_ends and needs_range(product)):
+        return product
+    notes.append(f"{scene.name}: the range of disparities is estimated first; a run shows what comes after `survey`")
+    return "survey"
 
 
 def _identity(scene: SceneSource) -> str:
@@ -194,7 +207,8 @@ class _Builder:
             return self._add_shipped(product)
         stage = STAGES[product]
         scene = None if stage.scope == "split" else scene
-        inputs = {name: self._inputs(stage, name, scene) for name in stage.inputs}
+        needed = getattr(self.config.section(product), "inputs", stage.inputs)
+        inputs = {name: self._inputs(stage, name, scene) for name in stage.inputs if name in needed}
         return self._add_stage(stage, scene, inputs)
 
     def _inputs(self, stage: Stage, product: str, scene: SceneSource | None) -> tuple[str, ...]:
@@ -212,7 +226,7 @@ class _Builder:
         return self._add(stage, None, product, settings, {}, code_parts(stage.module, PACKAGES))
 
     def _add_stage(self, stage: Stage, scene: SceneSource | None, inputs: Mapping[str, tuple[str, ...]]) -> str:
-        params = _resolved(self.config.section(stage.product), scene)
+        params = resolved(self.config.section(stage.product), scene)
         settings = params.model_dump(mode="json", exclude=NOT_IN_KEYS) | {"tiles": _tiles(stage, params)}
         return self._add(stage, scene, params, settings, inputs, code_parts(stage.module, PACKAGES))
 
@@ -229,7 +243,8 @@ class _Builder:
         identity = json.dumps([stage.product, name, dataset, size, settings, inputs], sort_keys=True)
         step_id = hashlib.sha256(identity.encode()).hexdigest()[:16]
         if step_id not in self.graph.steps:
-            threshold = self.config.semidense.R if stage.product in ("semidense", "metrics") else None
+            own = self.config.semidense
+            threshold = own.R if stage.product in ("semidense", "metrics") and own.density is None else None
             self.graph.steps[step_id] = Step(
                 id=step_id,
                 stage=stage,
@@ -244,32 +259,6 @@ class _Builder:
                 R=threshold,
             )
         return step_id
-
-
-def _resolved(params: Params, scene: SceneSource | None) -> Params:
-    """Return the settings with what was left open filled in: the scene's range, this CPU's precision."""
-    update: dict[str, Any] = {}
-    if scene:
-        _require_within(params, scene)
-    if hasattr(params, "precision"):
-        update["precision"] = resolve(params.precision)
-    if scene and getattr(params, "d_min", 0) is None:
-        update["d_min"] = scene.disparities.minimum
-    if scene and getattr(params, "d_max", 0) is None:
-        update["d_max"] = scene.disparities.maximum
-    try:
-        return type(params).model_validate(dict(params) | update)
-    except ValidationError as error:
-        raise UsageError(f"{scene.name if scene else SPLIT}: {one_line(error)}") from None
-
-
-def _require_within(params: Params, scene: SceneSource) -> None:
-    """Refuse a range that no pixel of the image can have: it would only fill memory and disk."""
-    width = scene.size[1]
-    for name in ("d_min", "d_max"):
-        value = getattr(params, name, None)
-        if value is not None and abs(value) >= width:
-            raise UsageError(f"{scene.name}: {name} is {value} px, but the image is only {width} px wide")
 
 
 def _tiles(stage: Stage, params: Params) -> str:

@@ -7,12 +7,15 @@ when something is computed.
 from stages.disparity_declaration import DISPARITY
 from stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
 from stages.filtering import SEMIDENSE
+from stages.finishing.declaration import FILLED, REFINED, RIGHT_DISPARITY
 from stages.matching.declaration import COST_VOLUME, MATCHING_NET, MATCHING_SAMPLES
 from stages.metrics import METRICS
 from stages.stage import Stage
+from stages.survey import SURVEY
 from stages.transforms.declaration import CHANNELS
 
 CATALOG: tuple[Stage, ...] = (
+    SURVEY,
     CHANNELS,
     MATCHING_SAMPLES,
     MATCHING_NET,
@@ -22,6 +25,9 @@ CATALOG: tuple[Stage, ...] = (
     EVALUATION_NET,
     CONFIDENCE,
     SEMIDENSE,
+    RIGHT_DISPARITY,
+    REFINED,
+    FILLED,
     METRICS,
 )
 """The stages, in the order of the dataflow."""

@@ -1,5 +1,6 @@
 """The semi-dense map: only disparities that the evaluation network trusts."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ class SemidenseParams(Params):
     """How much confidence a disparity needs."""
 
     R: float = Field(default=0.9, ge=0, le=1, description="least confidence that is kept; 0.9 in the paper")
+    density: float | None = Field(
+        default=None, gt=0, le=1, description="share of the image's pixels to keep, the most confident; replaces R"
+    )
 
 
 def keep_confident(disparity: NDArray[Any], confidence: NDArray[Any], R: float) -> NDArray[np.float32]:
@@ -40,6 +44,29 @@ def keep_confident(disparity: NDArray[Any], confidence: NDArray[Any], R: float) 
     return np.where(kept, disparity, np.nan).astype(np.float32)
 
 
+def threshold_for(density: float, disparity: NDArray[Any], confidence: NDArray[Any]) -> float:
+    """Return the R that keeps a share of the image's pixels: those of the highest confidence.
+
+    Args:
+        density: the share of all pixels, in (0, 1].
+        disparity: (y, x) float, NaN unknown; a pixel without one is never kept.
+        confidence: (y, x) float in [0, 1].
+
+    Returns:
+        The confidence of the last pixel that is kept. As many pixels as asked for are kept, and those that tie with
+        the last one; fewer only where fewer have a disparity. 1 if none has.
+
+    >>> threshold_for(0.5, np.array([[1.0, 2.0, 3.0, np.nan]]), np.array([[0.2, 0.7, 0.9, 0.99]]))
+    0.7
+    """
+    require_share("density", density)
+    scores = confidence[np.isfinite(disparity) & np.isfinite(confidence)]
+    if not scores.size:
+        return 1.0
+    kept = min(scores.size, max(1, math.ceil(density * disparity.size)))
+    return float(np.partition(scores, scores.size - kept)[scores.size - kept])
+
+
 def require_share(name: str, value: float) -> None:
     """Refuse a number outside [0, 1].
 
@@ -51,17 +78,21 @@ def require_share(name: str, value: float) -> None:
 
 
 def compute_semidense(params: SemidenseParams, inputs: Inputs) -> Arrays:
-    """Compute the product ``semidense``; see ``keep_confident``."""
+    """Compute the product ``semidense``; see ``keep_confident`` and ``threshold_for``."""
     disparity, confidence = inputs["disparity"]["disparity"], inputs["confidence"]["confidence"]
-    return {"disparity": keep_confident(disparity, confidence, params.R)}
+    R = params.R if params.density is None else threshold_for(params.density, disparity, confidence)
+    return {"disparity": keep_confident(disparity, confidence, R), "R": np.array([R])}
 
 
 SEMIDENSE = Stage(
     product="semidense",
     inputs=("disparity", "confidence"),
-    outputs=(Output("disparity", ("y", "x"), "float32", "px", "disparity of the left view; NaN: confidence below R"),),
+    outputs=(
+        Output("disparity", ("y", "x"), "float32", "px", "disparity of the left view; NaN: confidence below R"),
+        Output("R", ("all",), "float64", "1", "least confidence that was kept"),
+    ),
     compute="stages.filtering:compute_semidense",
     params=SemidenseParams,
-    tile_rows=128,
 )
-"""The filtered disparity. A sweep over R makes only this product and what is below it again."""
+"""The filtered disparity. A sweep over R makes only this product and what is below it again. Not tiled: a density is
+that of the whole map."""

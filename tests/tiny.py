@@ -1,5 +1,15 @@
 """The smallest run of the whole path: three scenes of 64 x 80 px, 9 disparities, two steps of training a network."""
 
+from stages.catalog import STAGES
+
+
+def _above(product: str) -> set[str]:
+    stage = STAGES.get(product)
+    return {product}.union(*(_above(each) for each in stage.inputs)) if stage else {product}
+
+
+PATH = _above("metrics")
+"""The products of a whole run; others are made on demand."""
 SPEC = "synthetic:train=2,test=1,height=64,width=80,disparities=8"
 SETTINGS = (
     "matching_samples.samples=8",

@@ -34,7 +34,7 @@ class CalibrationFile:
     """Hold what a ``calib.txt`` says.
 
     Attributes:
-        calibration: Focal length of the left camera, baseline and ``doffs``.
+        calibration: Focal length and principal point of the left camera, baseline and ``doffs``.
         size: Rows and columns of the images.
         ndisp: Number of disparities to search, from 0 on.
     """
@@ -53,12 +53,13 @@ def read_calib(path: str | os.PathLike[str]) -> CalibrationFile:
     """
     path = Path(path)
     entries = _Entries(path, _entries(path))
-    focal = entries.get("cam0", _focal, "a 3 x 3 matrix [f 0 cx; 0 f cy; 0 0 1] with f above 0")
+    focal, *centre = entries.get("cam0", _camera, "a 3 x 3 matrix [f 0 cx; 0 f cy; 0 0 1] with f above 0")
     return CalibrationFile(
         Calibration(
             focal,
             entries.get("baseline", _positive, "a number above 0"),
             entries.get("doffs", _number, "a number"),
+            (centre[0], centre[1]),
         ),
         (
             entries.get("height", _count, "a whole number above 0"),
@@ -129,10 +130,10 @@ def _count(text: str) -> int:
     return value
 
 
-def _focal(text: str) -> float:
+def _camera(text: str) -> tuple[float, float, float]:
     inside = re.fullmatch(r"\[(.*)\]", text)
     rows = [row.split() for row in inside[1].split(";")] if inside else []
     if [len(row) for row in rows] != [3, 3, 3]:
         raise ValueError(text)
     matrix = [[_number(item) for item in row] for row in rows]
-    return _positive(str(matrix[0][0]))
+    return _positive(str(matrix[0][0])), matrix[0][2], matrix[1][2]

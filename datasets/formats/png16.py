@@ -4,7 +4,9 @@ Source: the development kit of Menze & Geiger, "Object Scene Flow for Autonomous
 """
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +15,9 @@ from datasets.errors import Png16Error
 from datasets.formats.atomic import atomic_write
 from datasets.formats.images import read_image
 from datasets.formats.limits import check_pixels
+
+if TYPE_CHECKING:
+    from PIL.PngImagePlugin import PngInfo
 
 SCALE = 256
 """Steps to a pixel of disparity."""
@@ -37,33 +42,49 @@ def read_png16(path: str | os.PathLike[str]) -> DisparityMap:
     return np.where(stored > 0, stored.astype(np.float32) / SCALE, np.float32(np.nan)).astype(np.float32)
 
 
-def write_png16(path: str | os.PathLike[str], disparity: np.ndarray[tuple[int, ...], np.dtype[np.floating]]) -> None:
-    """Write a disparity map in KITTI's format, atomically.
+def write_png16(
+    path: str | os.PathLike[str],
+    disparity: np.ndarray[tuple[int, ...], np.dtype[np.floating]],
+    scale: float = SCALE,
+    about: Mapping[str, str] | None = None,
+) -> None:
+    """Write a map as 16-bit gray PNG, atomically; with the usual scale, KITTI's disparity format.
 
-    Values are rounded to the nearest 1/256 px, so that reading back is exact within 1/512 px. A known disparity below
-    1/512 px is stored as 1/256 px, because 0 means none.
+    Values are rounded to the nearest step, so that reading back is exact within half a step. A known value below half a
+    step is stored as one step, because 0 means none.
 
     Args:
         path: Where to; an existing file is replaced.
-        disparity: (y, x) float, pixels, from 0 to 65535/256, NaN where unknown.
+        disparity: (y, x) float, from 0 to 65535 steps, NaN where unknown.
+        scale: Steps to a unit.
+        about: Names and texts to store in the file.
 
     Raises:
         Png16Error: If the array is not a float map of (y, x), is empty, or holds values outside that range.
         OSError: If the file cannot be written.
     """
-    import imageio.v3 as iio  # here, as few who import this write
+    from PIL import Image  # here, as few who import this write
 
     path, disparity = Path(path), np.asarray(disparity)
     if disparity.ndim != 2 or disparity.dtype.kind != "f":
         raise Png16Error(f"{path}: give a float array of (rows, columns), not {disparity.dtype} of {disparity.shape}")
     check_pixels(path, disparity.shape[0], disparity.shape[1], Png16Error)
     known = ~np.isnan(disparity)
-    steps = np.rint(disparity.astype(np.float64) * SCALE)
+    steps = np.rint(disparity.astype(np.float64) * scale)
     if (disparity[known] < 0).any() or (steps[known] > _LARGEST).any():
         raise Png16Error(
-            f"{path}: disparities from {disparity[known].min():g} to {disparity[known].max():g}; the format holds "
-            f"0 to {_LARGEST / SCALE:g}; write PFM instead"
+            f"{path}: values from {disparity[known].min():g} to {disparity[known].max():g}; the format holds "
+            f"0 to {_LARGEST / scale:g}; write PFM instead"
         )
     stored = np.where(known, np.maximum(steps, 1), 0).astype(np.uint16)
     with atomic_write(path) as file:
-        iio.imwrite(file, stored, plugin="pillow", extension=".png")
+        Image.fromarray(stored).save(file, "PNG", pnginfo=_texts(about or {}))
+
+
+def _texts(about: Mapping[str, str]) -> "PngInfo":
+    from PIL.PngImagePlugin import PngInfo
+
+    texts = PngInfo()
+    for name, text in about.items():
+        texts.add_text(name, text)
+    return texts

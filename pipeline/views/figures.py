@@ -19,6 +19,7 @@ from pipeline.views.networks import draw_network
 from pipeline.views.panels import new_figure
 from pipeline.views.png import save_png
 from pipeline.views.samples import draw_evaluation_samples, draw_matching_samples
+from pipeline.views.surveys import draw_survey
 from pipeline.views.tables import draw_metrics
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
 _DRAW: Mapping[str, Callable[..., None]] = {
     "images": draw_images,
     "truth": draw_truth,
+    "survey": draw_survey,
     "channels": draw_channels,
     "matching_samples": draw_matching_samples,
     "matching_net": draw_network,
@@ -43,6 +45,9 @@ _DRAW: Mapping[str, Callable[..., None]] = {
     "evaluation_net": draw_network,
     "confidence": draw_confidence,
     "semidense": draw_disparity,
+    "right_disparity": draw_disparity,
+    "refined": draw_disparity,
+    "filled": draw_disparity,
     "metrics": draw_metrics,
 }
 """What draws each product."""
@@ -55,7 +60,8 @@ _TOLD = {
     "evaluation_samples": ("form", "samples", "tolerance"),
     "evaluation_net": ("steps",),
     "confidence": ("precision",),
-    "semidense": ("R",),
+    "semidense": ("R", "density"),
+    "refined": ("left_right", "subpixel"),
 }
 """The settings that a title tells."""
 _SPOKEN = {"True": "on", "False": "off"}
@@ -108,5 +114,6 @@ def product_title(dataset: xr.Dataset) -> str:
 def _told(product: str, params: Mapping[str, Any]) -> str:
     if "shipped" in params:
         return "shipped weights"
-    names = [name for name in _TOLD.get(product, ()) if name in params]
+    names = [name for name in _TOLD.get(product, ()) if params.get(name) is not None]
+    names = [name for name in names if not (name == "R" and "density" in names)]
     return ", ".join(f"{name.replace('_', ' ')} {_SPOKEN.get(str(params[name]), params[name])}" for name in names)

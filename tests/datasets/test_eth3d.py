@@ -25,7 +25,7 @@ def test_lists_scenes_at_any_level(tmp_path: Path, save_calibrated: Save, below:
     (source,) = list_scenes(str(tmp_path / below))
     assert (source.name, source.dataset, source.split, source.size) == (name, "eth3d", "test", (6, 8))
     assert source.disparities == DisparityRange(0, 63), "ndisp of calib.txt says nothing here"
-    assert source.calibration == Calibration(focal=100, baseline=50, doffs=1)
+    assert source.calibration == Calibration(focal=100, baseline=50, doffs=1, centre=(4, 3))
     truth = source.load_truth()
     assert truth is not None
     assert truth.mask == "warped truth"

@@ -83,5 +83,8 @@ def test_names_must_be_unique() -> None:
 
 def test_describe_lists_what_open_dataset_takes() -> None:
     patterns = [pattern for pattern, _ in describe()]
-    assert patterns == ["motorcycle", "middlebury:DIR", "kitti2015:DIR", "eth3d:DIR", "synthetic[:KEY=VALUE,...]"]
+    assert patterns == [
+        *("motorcycle", "middlebury:DIR", "kitti2015:DIR", "eth3d:DIR", "synthetic[:KEY=VALUE,...]"),
+        "pair:LEFT,RIGHT[,KEY=VALUE,...]",
+    ]
     assert all(description for _, description in describe())

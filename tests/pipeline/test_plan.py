@@ -16,6 +16,7 @@ from pipeline.reasons import PENDING
 from pipeline.steps import Request
 from pipeline.tasks import Made
 from tests.pipeline.toy import CALLS, chain, changes, states
+from tests.tiny import PATH
 
 ToyPlan = Callable[..., Plan]
 ToyRun = Callable[..., dict[str, Made]]
@@ -120,7 +121,7 @@ def test_a_damaged_record_is_a_missing_entry(toy_plan: ToyPlan, toy_run: ToyRun,
 
 ABOVE_CHANNELS = {"images", "truth", "matching_samples"}
 BELOW_DISPARITY = {"confidence", "semidense", "metrics"}
-ALL = set(steps.PRODUCTS)
+ALL = PATH
 
 
 def not_hit(plan: Plan) -> set[str]:

@@ -11,6 +11,7 @@ from pipeline.config import Config
 from pipeline.errors import UsageError
 from pipeline.steps import PRODUCTS, SPLIT, Graph, Request, Step, build, training_scenes
 from stages.stage import StageError
+from tests.tiny import PATH
 
 DATASET = open_dataset("synthetic:train=2,test=2,height=64,width=80,disparities=8")
 SHIPPED = {"matching_net", "evaluation_net"}
@@ -37,9 +38,9 @@ def counts(made: Graph) -> Counter[str]:
 
 def test_without_training_every_scene_is_worked_on_with_the_shipped_weights() -> None:
     made = graph()
-    assert counts(made) == Counter(
-        dict.fromkeys(set(PRODUCTS) - {"matching_samples", "evaluation_samples"}, 4)
-    ) - Counter(dict.fromkeys(SHIPPED, 3))
+    assert counts(made) == Counter(dict.fromkeys(PATH - {"matching_samples", "evaluation_samples"}, 4)) - Counter(
+        dict.fromkeys(SHIPPED, 3)
+    )
     assert made.notes == []
     assert len(made.targets) == 4
 

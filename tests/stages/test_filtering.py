@@ -2,12 +2,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from stages.filtering import SEMIDENSE, SemidenseParams, keep_confident
+from stages.filtering import SEMIDENSE, SemidenseParams, compute_semidense, keep_confident, threshold_for
 from stages.stage import StageError
-from tests.stages.tiling import same, tiled, whole
 
 N = np.nan
-DIMS = {"disparity": {"disparity": ("y", "x")}, "confidence": {"confidence": ("y", "x")}}
 
 
 def maps() -> dict[str, dict[str, np.ndarray]]:
@@ -67,14 +65,43 @@ def test_the_papers_threshold_is_the_default() -> None:
     assert SemidenseParams().R == 0.9
 
 
-@pytest.mark.parametrize("rows", [1, 6, 19])
-def test_tiles_equal_the_whole(rows: int) -> None:
-    params = SemidenseParams(R=0.5)
-    assert same(tiled(SEMIDENSE, params, maps(), DIMS, rows), whole(SEMIDENSE, params, maps(), DIMS))
+@pytest.mark.parametrize(
+    ("density", "kept"),
+    [
+        pytest.param(0.25, 1, id="the most confident"),
+        pytest.param(0.26, 2, id="at least as many as asked for"),
+        pytest.param(0.75, 3, id="all that have a disparity"),
+        pytest.param(1, 3, id="no more than have one"),
+    ],
+)
+def test_a_density_keeps_the_most_confident(density: float, kept: int) -> None:
+    disparity, confidence = np.float32([[5, 6, 7, N]]), np.float32([[0.2, 0.9, 0.5, 0.99]])
+    inputs = {"disparity": {"disparity": disparity}, "confidence": {"confidence": confidence}}
+    made = compute_semidense(SemidenseParams(density=density), inputs)
+    assert np.isfinite(made["disparity"]).sum() == kept
+    assert made["R"][0] == np.float32([0.9, 0.5, 0.2])[kept - 1]
+
+
+def test_pixels_that_tie_with_the_last_are_kept_too() -> None:
+    ones = np.ones((2, 2), np.float32)
+    assert threshold_for(0.25, ones, ones) == 1
+    inputs = {"disparity": {"disparity": ones}, "confidence": {"confidence": ones}}
+    assert np.isfinite(compute_semidense(SemidenseParams(density=0.25), inputs)["disparity"]).all()
+
+
+def test_a_density_of_a_map_without_disparities_keeps_nothing() -> None:
+    assert threshold_for(0.5, np.full((2, 2), N), np.ones((2, 2))) == 1
+
+
+@pytest.mark.parametrize("density", [0, 1.5, N])
+def test_the_section_refuses_a_density(density: float) -> None:
+    with pytest.raises(ValidationError, match="density"):
+        SemidenseParams(density=density)
 
 
 def test_the_stage_makes_what_it_declares() -> None:
     made = SEMIDENSE.function()(SemidenseParams(R=0.5), maps())
-    assert list(made) == [output.name for output in SEMIDENSE.outputs]
-    assert made["disparity"].dtype == SEMIDENSE.outputs[0].dtype
+    assert {name: str(array.dtype) for name, array in made.items()} == {
+        output.name: output.dtype for output in SEMIDENSE.outputs
+    }
     assert 0 < np.isnan(made["disparity"]).mean() < 1

@@ -9,10 +9,9 @@ from typing import Any
 import pytest
 
 from pipeline.api import Result
-from pipeline.steps import PRODUCTS
-from tests.tiny import TRAINED
+from tests.tiny import PATH, TRAINED
 
-ALL = set(PRODUCTS)
+ALL = PATH
 BELOW_CHANNELS = ALL - {"images", "truth", "matching_samples"}
 
 

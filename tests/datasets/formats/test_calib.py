@@ -25,7 +25,7 @@ def save(folder: Path, entries: dict[str, str]) -> Path:
 
 def test_reads_what_is_published(tmp_path: Path) -> None:
     calib = read_calib(save(tmp_path, GOOD))
-    assert calib.calibration == Calibration(focal=994.978, baseline=193.001, doffs=31.086)
+    assert calib.calibration == Calibration(focal=994.978, baseline=193.001, doffs=31.086, centre=(311.193, 254.877))
     assert calib.size == (500, 741)
     assert calib.ndisp == 70
 

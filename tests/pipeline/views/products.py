@@ -101,9 +101,22 @@ def metrics() -> xr.Dataset:
     return xr.Dataset(figures, coords={"threshold": list(THRESHOLDS)})
 
 
+def survey() -> xr.Dataset:
+    matches = np.array([[1, 4, 2, 0], [2, 3, 1, 0], [2, 4, 2, 1]], np.float32)
+    return xr.Dataset(
+        {
+            "matches": (("match", "field"), matches),
+            "range": ("bound", np.array([0, 4], np.float32)),
+            "step": ("all", np.array([1], np.int32)),
+            "left": (("row", "column"), np.arange(24, dtype=np.uint8).reshape(4, 6)),
+        }
+    )
+
+
 PRODUCTS: dict[str, Callable[[], xr.Dataset]] = {
     "images": images,
     "truth": truth,
+    "survey": survey,
     "channels": channels,
     "matching_samples": matching_samples,
     "matching_net": network,
@@ -113,5 +126,8 @@ PRODUCTS: dict[str, Callable[[], xr.Dataset]] = {
     "evaluation_net": shipped,
     "confidence": confidence,
     "semidense": disparity,
+    "right_disparity": disparity,
+    "refined": disparity,
+    "filled": disparity,
     "metrics": metrics,
 }

@@ -69,6 +69,11 @@ def test_every_product_of_the_pipeline_has_a_figure() -> None:
         ),
         pytest.param("semidense", ["disparity (px)", "none: 8.3 %"], id="as-disparity"),
         pytest.param(
+            "survey",
+            ["3 matches; range to search 0 to 4 px", "median +0.0 px", "vertical offset, right minus left (px)"],
+            id="matches-on-the-view",
+        ),
+        pytest.param(
             "metrics", ["threshold\n(px)", "raw_bad\n(%)", "rms\n(px)", "nonocc", "1,234", "n/a"], id="readable-table"
         ),
     ],

@@ -1,0 +1,165 @@
+"""The command ``match``: a user's own pair, or many of them. Nothing heavy is imported before it runs."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from pipeline.api import Task
+    from pipeline.pairs import Match, Wishes
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command()(match)
+
+
+def match(
+    left: Annotated[str, typer.Argument(help="The left view; or a folder, a pattern with one *, or a list (.csv).")],
+    right: Annotated[str | None, typer.Argument(help="The right view, as LEFT; nothing for a list.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Write everything to this folder.")] = Path("matched"),
+    min_disp: Annotated[
+        int | None, typer.Option(help="Smallest disparity, px [default: the calibration's, else estimated].")
+    ] = None,
+    max_disp: Annotated[int | None, typer.Option(help="Largest disparity, px.")] = None,
+    calib: Annotated[
+        list[str] | None,
+        typer.Option(help="calib.txt, OpenCV's YAML or XML, or twice: ROS's left and right files."),
+    ] = None,
+    unit: Annotated[str | None, typer.Option(help="Unit of length of an OpenCV calibration: mm, cm or m.")] = None,
+    threshold: Annotated[
+        float | None, typer.Option("--R", help="Least confidence that is kept [default: 0.9].")
+    ] = None,
+    density: Annotated[
+        str | None, typer.Option(help="Keep this share of the image instead, the most confident; such as 80%.")
+    ] = None,
+    left_right: Annotated[bool, typer.Option("--left-right", help="Drop what the right view contradicts.")] = False,
+    subpixel: Annotated[bool, typer.Option("--subpixel", help="Refine disparities below a pixel.")] = False,
+    fill: Annotated[
+        bool, typer.Option("--fill", help="Fill holes with the background: dense, partly guessed.")
+    ] = False,
+    right_view: Annotated[bool, typer.Option("--right-view", help="Write the right view's raw map too.")] = False,
+    formats: Annotated[str, typer.Option("--format", help="Formats of the maps.")] = "pfm,png,tiff,npy",
+    scene: Annotated[
+        list[str] | None, typer.Option("--scene", help="Only this pair of several; may be repeated.")
+    ] = None,
+    settings: Annotated[list[str] | None, typer.Option("--set", help="section.field=value; may be repeated.")] = None,
+    config: Annotated[Path | None, typer.Option("--config", help="A TOML file with the same sections.")] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be reused and made.")] = False,
+    scheduler: Annotated[str | None, typer.Option("--scheduler", help="A Dask scheduler, tcp://HOST:PORT.")] = None,
+    workers: Annotated[int | None, typer.Option("--workers", min=1, help="Threads [default: one a core].")] = None,
+    cache: Annotated[Path | None, typer.Option("--cache", help="The cache's folder.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+) -> None:
+    """Match your own rectified pair, or many: disparities, confidence, depth and points as files."""
+    from datasets.pair import PairOptions, pair_spec
+    from pipeline.api import Task
+    from pipeline.pairs import Wishes
+
+    options = PairOptions(tuple(calib or ()), unit, min_disp, max_disp)
+    sides = [left] if right is None else [left, right]
+    task = Task(pair_spec(sides, options), tuple(scene or ()), tuple(settings or ()), config, False, cache)
+    wishes = Wishes(
+        R=threshold,
+        density=_share(density),
+        left_right=left_right,
+        subpixel=subpixel,
+        fill=fill,
+        right_view=right_view,
+    )
+    kinds = _formats(formats)
+    if dry_run:
+        _plan(task, wishes, as_json)
+    else:
+        _carry_out(task, wishes, output, kinds, {"scheduler": scheduler, "workers": workers}, as_json)
+
+
+def _plan(task: "Task", wishes: "Wishes", as_json: bool) -> None:
+    from dataclasses import replace
+
+    from pipeline import api, console
+
+    plan = api.status(replace(task, settings=(*task.settings, *wishes.settings)), wishes.product)
+    if as_json:
+        console.print_json({"steps": console.step_rows(plan, {})})
+    else:
+        console.print_plan(plan)
+
+
+def _carry_out(
+    task: "Task", wishes: "Wishes", output: Path, kinds: Sequence[str], how: dict[str, Any], as_json: bool
+) -> None:
+    from pipeline import console
+    from pipeline.match_files import save_all
+    from pipeline.pairs import match_all
+    from pipeline.progress import ProgressWatch
+
+    with ProgressWatch() as watch:
+        found = match_all(task, wishes, watch=watch, **how)
+    summaries = save_all(found, output, kinds)
+    for each in found:
+        for warning in each.warnings:
+            print(f"warning: {each.scene.name}: {warning} (see survey.png)", file=sys.stderr)
+    if as_json:
+        console.print_json({"pairs": summaries})
+        return
+    for each, about in zip(found, summaries, strict=True):
+        _say(each, about)
+    print(console.reuse_line(_results(found)))
+
+
+def _say(match: "Match", about: dict[str, Any]) -> None:
+    """Print one pair's result: what was searched, what was kept, where it is."""
+    low, high = match.disparities.minimum, match.disparities.maximum
+    ends = " (estimated from the images)" if match.scene.open_ends else ""
+    print(f"{match.scene.name}: {about['rows']} x {about['columns']} px, disparities {low} to {high} px{ends}")
+    kept = about["density_percent"] - about["guessed_percent"]
+    print(f"  kept {kept:.1f} % of the pixels, at R = {match.R:.3g} ({about['R_from']})")
+    if match.wishes.fill:
+        print(f"  {about['guessed_percent']:.1f} % are filled in: guesses (guessed.png)")
+    for note in about["notes"]:
+        print(f"  {note}")
+    print(f"  wrote {len(about['files']) + 1} files to {about['folder']}; summary.json says what each holds")
+
+
+def _results(found: "Sequence[Match]") -> list[Any]:
+    """Return every result once, as it was first met: a later run only finds again what an earlier one made."""
+    first: dict[str, Any] = {}
+    for run in (found[0].others[0], found[0].result, *found[0].others[1:]):
+        for made in run.made.values():
+            first.setdefault(made.key, made)
+    return list(first.values())
+
+
+def _share(text: str | None) -> float | None:
+    """Return what ``80%`` or ``0.8`` means.
+
+    Raises:
+        UsageError: if it is no share above 0 and up to 1.
+    """
+    if text is None:
+        return None
+    from pipeline.errors import UsageError
+
+    try:
+        value = float(text[:-1]) / 100 if text.endswith("%") else float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0 < value <= 1:
+        raise UsageError(f"density {text!r}: write a share of the pixels, such as 80% or 0.8")
+    return value
+
+
+def _formats(text: str) -> list[str]:
+    from pipeline.config import nearest
+    from pipeline.errors import UsageError
+    from pipeline.map_files import FORMATS
+
+    chosen = [kind.strip() for kind in text.split(",") if kind.strip()]
+    for kind in chosen:
+        if kind not in FORMATS:
+            raise UsageError(f"no format {kind!r}; {nearest(kind, FORMATS)}")
+    return chosen

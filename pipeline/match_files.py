@@ -1,0 +1,172 @@
+"""Write what a matched pair gives into a folder: all of it, or nothing.
+
+::
+
+    FOLDER/
+        summary.json            parameters, versions, timings, density, warnings, and what each file holds
+        disparity.*             the map: .pfm (none: infinity), .png (KITTI's 16 bits, none: 0), .tif, .npy (none: NaN)
+        disparity-colour.png    the same with a legend
+        confidence.*            the same formats, and confidence-colour.png
+        depth.*                 with a calibration: metres (16-bit PNG: millimetres)
+        points.ply              with a calibration: the coloured points, right side up
+        right_disparity.*       if asked for: the right view's raw map
+        guessed.png             if holes were filled: white where
+        survey.png              if something looks wrong with the pair: where
+
+The files are made in a hidden folder beside their place and moved when all of them are there.
+"""
+
+import json
+import secrets
+import shutil
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from datasets.formats.ply import write_ply
+from pipeline.api import open_product
+from pipeline.exporter import writable_folder
+from pipeline.map_files import CONFIDENCE, DEPTH, DISPARITY, FORMATS, RIGHT_DISPARITY, Png16Error, Quantity, write_map
+from pipeline.naming import safe_names
+from pipeline.pairs import Match
+from pipeline.tasks import provenance
+from pipeline.views.png import explaining, write_rgb
+
+_POINTS = "x right, y up, z towards the viewer; metres, from the left camera"
+
+
+def save_all(matches: Sequence[Match], folder: Path, formats: Sequence[str] = FORMATS) -> list[dict[str, Any]]:
+    """Write pairs: a single one into the folder itself, several into a folder each, named by the pair.
+
+    Returns:
+        The summaries, as ``summary.json`` holds them.
+
+    Raises:
+        UsageError: if the folder cannot be written; nothing of a pair that could not be written whole is left.
+        CacheError: if a result is no longer in the cache.
+    """
+    names = safe_names(match.scene.name for match in matches)
+    places = [folder if len(matches) == 1 else folder / names[match.scene.name] for match in matches]
+    return [save(match, place, formats) for match, place in zip(matches, places, strict=True)]
+
+
+def save(match: Match, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Any]:
+    """Write one pair; as `save_all`."""
+    writable_folder(folder)
+    with explaining(folder), _draft(folder) as draft:
+        writer = _Writer(match, draft, formats)
+        writer.write_maps()
+        writer.write_pictures()
+        writer.write_points()
+        summary = writer.write_summary()
+        for path in sorted(draft.iterdir()):
+            path.replace(folder / path.name)
+    return summary | {"folder": str(folder)}
+
+
+@contextmanager
+def _draft(folder: Path) -> Iterator[Path]:
+    """Make a hidden folder inside another one, which is gone in the end."""
+    draft = folder / f".match-{secrets.token_hex(4)}"
+    draft.mkdir()
+    try:
+        yield draft
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+@dataclass
+class _Writer:
+    """The files of one pair, written so far."""
+
+    match: Match
+    folder: Path
+    formats: Sequence[str]
+    files: list[dict[str, str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def write_maps(self) -> None:
+        """Write every map of numbers."""
+        self._write(DISPARITY, self.match.disparity)
+        self._write(CONFIDENCE, self.match.confidence)
+        if self.match.scene.calibration:
+            self._write(DEPTH, self.match.depth)
+        if self.match.wishes.right_view:
+            self._write(RIGHT_DISPARITY, self.match.right_disparity)
+
+    def _write(self, quantity: Quantity, values: np.ndarray[Any, np.dtype[np.float32]]) -> None:
+        for kind in self.formats:
+            try:
+                name, about = write_map(values, quantity, kind, self.folder)
+            except Png16Error as error:
+                self.notes.append(f"{quantity.name}.png was not written: {str(error).partition(': ')[2]}")
+            else:
+                self.files.append({"file": name, **about})
+
+    def write_pictures(self) -> None:
+        """Write what is for the eye."""
+        self._draw(self.match.wishes.product, "disparity-colour.png")
+        self._draw("confidence", "confidence-colour.png")
+        if self.match.wishes.fill:
+            write_rgb(
+                self.match.guessed.astype(np.uint8)[..., np.newaxis].repeat(3, axis=2) * 255,
+                self.folder / "guessed.png",
+            )
+            self.files.append(
+                {"file": "guessed.png", "quantity": "white: filled in, a guess", "reference view": "left"}
+            )
+        if self.match.warnings:
+            self._draw("survey", "survey.png")
+
+    def _draw(self, product: str, name: str) -> None:
+        from pipeline.views.figures import figure, product_title, save_png
+
+        dataset = open_product(self.match.result.store, self.match.made(product).key)
+        save_png(figure(product, dataset, title=product_title(dataset)), self.folder / name)
+        self.files.append({"file": name, "quantity": f"picture of {product}, with a legend", "reference view": "left"})
+
+    def write_points(self) -> None:
+        """Write the cloud, if there is a calibration."""
+        if self.match.scene.calibration:
+            write_ply(self.folder / "points.ply", *self.match.points(), [_POINTS])
+            self.files.append(
+                {"file": "points.ply", "quantity": f"points: {_POINTS}", "unit": "m", "reference view": "left"}
+            )
+
+    def write_summary(self) -> dict[str, Any]:
+        """Write and return the summary."""
+        about = summary(self.match) | {"notes": self.notes, "files": self.files}
+        (self.folder / "summary.json").write_text(json.dumps(about, indent=2, allow_nan=False) + "\n")
+        return about
+
+
+def summary(match: Match) -> dict[str, Any]:
+    """Return what is to be said of a matched pair, ready for JSON."""
+    steps = [each for each in match.result.made.values() if each.step.scene == match.scene.name]
+    known = match.scene.calibration
+    wishes = match.wishes
+    return {
+        "pair": match.scene.name,
+        "left": str(match.scene.files.get("left", "an array")),
+        "right": str(match.scene.files.get("right", "an array")),
+        "rows": match.scene.size[0],
+        "columns": match.scene.size[1],
+        "reference_view": "left",
+        "disparities": asdict(match.disparities) | {"estimated": list(match.scene.open_ends)},
+        "R": match.R,
+        "R_from": "from the pair's own confidences, for the density asked for" if wishes.density else "as set",
+        "wishes": asdict(wishes),
+        "density_percent": 100 * match.density,
+        "guessed_percent": 100 * float(match.guessed.mean()),
+        "calibration_mm_px": asdict(known) if known else None,
+        "warnings": match.warnings,
+        "seconds": {each.step.product: each.seconds for each in steps},
+        "reused": [each.step.product for each in steps if each.reused],
+        "settings": {each.step.product: dict(each.step.settings) for each in steps},
+        "keys": {each.step.product: each.key for each in steps},
+    } | {name: value for name, value in provenance(sys.argv, {}).items() if name != "configuration"}

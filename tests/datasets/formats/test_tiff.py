@@ -1,0 +1,28 @@
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import tifffile
+
+from datasets import ImageError
+from datasets.formats.tiff import write_tiff
+
+VALUES = np.array([[0.1, np.nan, -7.25], [np.pi, 1e-30, 65504.123]], np.float32)
+
+
+def test_independent_readers_get_the_same_bits(tmp_path: Path) -> None:
+    write_tiff(tmp_path / "a.tif", VALUES, {"unit": "px"})
+    for read in (tifffile.imread(tmp_path / "a.tif"), cv2.imread(str(tmp_path / "a.tif"), cv2.IMREAD_UNCHANGED)):
+        assert read.dtype == np.float32
+        assert np.array_equal(read, VALUES, equal_nan=True)
+    with tifffile.TiffFile(tmp_path / "a.tif") as file:
+        assert json.loads(file.pages[0].tags["ImageDescription"].value) == {"unit": "px"}
+
+
+@pytest.mark.parametrize("bad", [np.zeros((2, 2), int), np.zeros((2, 2, 3)), np.zeros((0, 2))])
+def test_what_is_no_map_is_refused_and_leaves_nothing(tmp_path: Path, bad: np.ndarray) -> None:
+    with pytest.raises(ImageError):
+        write_tiff(tmp_path / "a.tif", bad)
+    assert list(tmp_path.iterdir()) == []
