@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipeline import cli_view
+
 if TYPE_CHECKING:
     from pipeline.api import Result, Task
     from pipeline.plan import Plan
@@ -261,6 +263,9 @@ def _export(result: "Result", output: Path | None) -> list[Path]:
     from pipeline.exporter import export
 
     return export(result, output)
+
+
+cli_view.register(app)
 
 
 class _Stopped(BaseException):
