@@ -148,16 +148,12 @@ def explain(
 ) -> None:
     """Show what a product's key is made of."""
     from pipeline import api
+    from pipeline.console import print_json
     from pipeline.explanation import explanation, print_explanation
 
     planned = api.explain(_task(dataset, scene, settings, config, train, cache), product)
     found = explanation(planned, api.open_store(cache))
-    if as_json:
-        from pipeline.console import print_json
-
-        print_json(found)
-    else:
-        print_explanation(found)
+    print_json(found) if as_json else print_explanation(found)
 
 
 @app.command()

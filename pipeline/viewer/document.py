@@ -32,7 +32,8 @@ def build(document: Document, store: Store) -> Session:
     boxes = [panel.box for panel in panels.maps.values()]
     frame = Row(controls.nearer, controls.farther, controls.whole, margin=0, spacing=6)
     roots: dict[str, LayoutDOM] = {
-        "choices": _wrapping(*choices, frame, panels.about),
+        "choices": _wrapping(*choices, frame),
+        "about": panels.about,
         "problem": panels.problem,
         "R": controls.R,
         "told": panels.told,

@@ -50,7 +50,7 @@ class Sources:
         self.patches = ColumnDataSource({name: [] for name in ("patch", *_PLACED)}, name="patches")
         self.gray = ColumnDataSource({name: [] for name in ("gray", *_PLACED)}, name="gray-patch")
         self.seen = ColumnDataSource({name: [] for name in ("disparity", *_PLACED)}, name="disparity-patch")
-        self.base.name, self.kept.name, self.swiped.name = "base", "kept", "swiped"
+        self.base.name, self.kept.name, self.swiped.name = "base-data", "kept-data", "swiped-data"
 
 
 _PLACED = ("x", "y", "dw", "dh", "label", "mx", "my", "side")

@@ -1,5 +1,6 @@
 """Bokeh's server with the one page, bound to this machine."""
 
+import signal
 import sys
 
 from bokeh.application import Application
@@ -42,11 +43,14 @@ def start(store: Store, port: int) -> Server:
 
 
 def serve(store: Store, port: int, show: bool) -> None:
-    """Serve until the process is stopped."""
+    """Serve until SIGINT or SIGTERM: for a server that is the usual end."""
     server = start(store, port)
     address = f"http://localhost:{server.port}/"
     sys.stdout.write(f"viewer over {store.root}: {address} (Ctrl+C to stop)\n")
     sys.stdout.flush()
     if show:
         server.io_loop.add_callback(server.show, "/")
+    for number in (signal.SIGINT, signal.SIGTERM):
+        server.io_loop.asyncio_loop.add_signal_handler(number, server.io_loop.stop)
     server.io_loop.start()
+    server.stop()
