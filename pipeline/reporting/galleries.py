@@ -33,7 +33,7 @@ def _zoom(name: str) -> Html:
 
 
 def _figure(picture: Picture, ratio: str) -> Html:
-    image = tag("img", src=picture.source, alt="", decoding="async").removesuffix("</img>")
+    image = tag("img", src=picture.source, alt="", decoding="sync").removesuffix("</img>")
     frame = tag("div", image, class_="frame", style=ratio, tabindex=0, role="img", aria_label=picture.title)
     return tag("figure", tag("figcaption", text(picture.title)), frame, tag("div", picture.legend, class_="legend"))
 
