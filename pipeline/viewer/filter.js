@@ -17,6 +17,7 @@ const at = table.data.R.findIndex((each) => Math.abs(each - R) < 1e-9)
 const known = at >= 0
 point.data.invalid = known ? [table.data.invalid[at]] : []
 point.data.bad = known ? [table.data.bad[at]] : []
+point.data.side = known ? [table.data.invalid[at] > 50 ? "right" : "left"] : []
 point.data.label = known ? [`R = ${R}`] : []
 point.change.emit()
 const number = (name, digits) => Number.isFinite(table.data[name][at]) ? table.data[name][at].toFixed(digits) : "none"

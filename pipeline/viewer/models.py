@@ -43,7 +43,7 @@ class Sources:
         self.other = blank("disparity", "confidence", "error")
         self.swiped = blank("disparity", "error", "confidence")
         self.table = ColumnDataSource({name: [] for name in _FIGURES}, name="table")
-        self.point = ColumnDataSource({"invalid": [], "bad": [], "label": []}, name="point")
+        self.point = ColumnDataSource({"invalid": [], "bad": [], "label": [], "side": []}, name="point")
         self.step = ColumnDataSource({"step": [1]})
         self.curve = ColumnDataSource({"d": [0, 1], "cost": [0, 1]}, name="cost-curve")
         self.marks = ColumnDataSource({"d": [], "cost": [], "marker": [], "colour": []}, name="cost-marks")

@@ -182,7 +182,8 @@ def curve_chart(table: ColumnDataSource, point: ColumnDataSource) -> Any:  # noq
     plot.line("invalid", "bad", source=table, color=BLUE, line_width=2)
     plot.scatter("invalid", "bad", source=table, color=BLUE, size=4)
     plot.scatter("invalid", "bad", source=point, color=RED, line_color="black", size=14)
-    plot.text("invalid", "bad", text="label", source=point, x_offset=12, y_offset=-8, text_font_style="bold")
+    label = {"text": "label", "text_align": "side", "y_offset": -10, "text_font_style": "bold"}
+    plot.text("invalid", "bad", source=point, **label)
     plot.add_tools(
         HoverTool(
             renderers=[plot.renderers[1]],

@@ -20,14 +20,20 @@ def made(tmp_path: Path) -> Handmade:
     return handmade(tmp_path / "cache")
 
 
-@pytest.fixture
-def session(made: Handmade) -> Session:
-    return build(Document(), made.store)
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> Handmade:
+    return handmade(tmp_path_factory.mktemp("shown") / "cache")
 
 
-def test_the_latest_configuration_is_shown(session: Session, made: Handmade) -> None:
-    np.testing.assert_array_equal(session.sources.base.data["disparity"][0], made.arrays["disparity"]["disparity"])
-    np.testing.assert_array_equal(session.sources.base.data["confidence"][0], made.arrays["confidence"]["confidence"])
+@pytest.fixture(scope="module")
+def session(shown: Handmade) -> Session:
+    """A page that the tests share: making one takes most of their time."""
+    return build(Document(), shown.store)
+
+
+def test_the_latest_configuration_is_shown(session: Session, shown: Handmade) -> None:
+    np.testing.assert_array_equal(session.sources.base.data["disparity"][0], shown.arrays["disparity"]["disparity"])
+    np.testing.assert_array_equal(session.sources.base.data["confidence"][0], shown.arrays["confidence"]["confidence"])
     assert all(panel.box.visible for panel in session.panels.maps.values())
     assert not session.panels.swiped.box.visible
     assert not session.panels.costs_box.visible
@@ -47,9 +53,9 @@ def test_a_tap_outside_the_image_does_nothing(session: Session) -> None:
 
 
 @pytest.mark.parametrize(("y", "x"), [(0, 0), (59, 89), (30, 2)], ids=["corner", "other corner", "few costs"])
-def test_every_pixel_can_be_shown(session: Session, made: Handmade, y: int, x: int) -> None:
+def test_every_pixel_can_be_shown(session: Session, shown: Handmade, y: int, x: int) -> None:
     session._tap(SimpleNamespace(x=x + 0.3, y=y - 0.3))
-    cost = made.arrays["costvolume"]["cost"][y, x].astype(np.float32)
+    cost = shown.arrays["costvolume"]["cost"][y, x].astype(np.float32)
     np.testing.assert_array_equal(session.sources.curve.data["cost"], cost)
     assert session.panels.pixel.text.startswith(f"<p>y = {y}, x = {x}; raw disparity")
     assert len(session.sources.patches.data["patch"]) in (6, 9)
@@ -87,7 +93,8 @@ def test_a_second_configuration_is_offered_and_shown(made: Handmade) -> None:
     assert first
 
 
-def test_an_entry_that_vanished_is_one_line(session: Session, made: Handmade) -> None:
+def test_an_entry_that_vanished_is_one_line(made: Handmade) -> None:
+    session = build(Document(), made.store)
     made.store.layout.record(made.entries["disparity"].key).unlink()
     session.choose_configuration()
     assert "no entry has the key" in session.panels.problem.text
@@ -99,8 +106,8 @@ def test_an_empty_cache_says_what_to_do(tmp_path: Path) -> None:
     assert "make something with `pipeline run`" in session.panels.problem.text
 
 
-def test_provenance_is_told(session: Session, made: Handmade) -> None:
-    assert made.entries["confidence"].key in session.panels.products.text
+def test_provenance_is_told(session: Session, shown: Handmade) -> None:
+    assert shown.entries["confidence"].key in session.panels.products.text
     assert "open_product" in session.panels.products.text
 
 
