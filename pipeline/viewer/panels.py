@@ -191,6 +191,7 @@ def curve_chart(table: ColumnDataSource, point: ColumnDataSource) -> Any:  # noq
         )
     )
     plot.y_range.start = 0
+    plot.y_range.range_padding = 0.25  # room for the label of R
     return plot
 
 
