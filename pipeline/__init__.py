@@ -11,7 +11,21 @@ The verbs of the command line as functions; products come back as lazy xarray ob
 from importlib import import_module
 from typing import Any
 
-__all__ = ["Config", "Match", "Result", "StereoMatcher", "Task", "explain", "export", "match", "run", "status", "sweep"]
+__all__ = [
+    "Config",
+    "Match",
+    "Result",
+    "StereoMatcher",
+    "Task",
+    "explain",
+    "export",
+    "match",
+    "report",
+    "run",
+    "status",
+    "sweep",
+    "view",
+]
 
 _HOMES = {
     "Config": "pipeline.config",
@@ -19,6 +33,8 @@ _HOMES = {
     "StereoMatcher": "pipeline.stereo_matcher",
     "export": "pipeline.exporter",
     "match": "pipeline.pairs",
+    "report": "pipeline.reporting",
+    "view": "pipeline.viewer",
 }
 
 

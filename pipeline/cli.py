@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipeline import cli_match
+from pipeline import cli_match, cli_view
 from pipeline.cli_cache import cache_app
 
 if TYPE_CHECKING:
@@ -242,6 +242,9 @@ def _export(result: "Result", output: Path | None) -> list[Path]:
     from pipeline.exporter import export
 
     return export(result, output)
+
+
+cli_view.register(app)
 
 
 class _Stopped(BaseException):

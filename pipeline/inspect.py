@@ -65,6 +65,18 @@ def _parse_pixel(text: str, dataset: "xr.Dataset") -> tuple[int, int]:
     return y, x
 
 
+def _draw_in_terminal(found: Inspection) -> None:
+    """Draw a map below its figures, if it is one and stdout is a terminal that can show it."""
+    from pipeline.terminal import can_draw, draw_picture
+
+    if can_draw(Console()):
+        from pipeline.views.small import small_picture
+
+        picture = small_picture(found.planned.step.product, found.dataset)
+        if picture:
+            draw_picture(*picture)
+
+
 def statistics(dataset: "xr.Dataset") -> list[dict[str, Any]]:
     """Return for each array: dims, dtype, least and largest value, mean, share of NaN; read a chunk at a time."""
     return [_array_statistics(str(name), array) for name, array in dataset.data_vars.items() if name != "probability"]
@@ -105,7 +117,10 @@ def print_inspection(found: Inspection, png: Path | None, as_json: bool) -> None
         figures = [f"{row[name]:.4g}" if name in row else "-" for name in ("min", "max", "mean")]
         none = f"{100 * row['none']:.1f} %" if "none" in row else "-"
         table.add_row(row["name"], row["dims"], row["dtype"], *figures, none, row["units"])
+    for column in table.columns[3:7]:
+        column.justify = "right"
     console.print(table)
+    _draw_in_terminal(found)
     if png:
         console.print(f"wrote {png}", markup=False)
     console.print(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from pipeline.api import Result
 from pipeline.naming import safe_names
+from pipeline.plan import Planned
 from pipeline.steps import SPLIT, Step
 from pipeline.tasks import Made
 
@@ -29,11 +30,11 @@ class Wanted:
         return self.made.step.product
 
 
-def lineage(made: Mapping[str, Made], step_id: str, *, over_training: bool = False) -> list[Step]:
+def lineage(made: Mapping[str, Made | Planned], step_id: str, *, over_training: bool = False) -> list[Step]:
     """Return a step and what it was made from, nearest first.
 
     Args:
-        made: the results of a run, by step.
+        made: the results of a run, or the steps of a plan, by the step's id.
         step_id: the step.
         over_training: go on through the training scenes; without, only steps of the same scene and of the training
             split are in it, one a product.

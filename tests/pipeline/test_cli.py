@@ -14,7 +14,10 @@ from pipeline.api import Result
 from tests.tiny import PATH, SPEC, TEST_ONLY, TRAINED
 
 Invoke = Callable[..., Any]
-COMMANDS = ("run", "sweep", "status", "explain", "inspect", "cache ls", "cache verify", "cache size", "data list")
+COMMANDS = (
+    *("run", "sweep", "status", "explain", "inspect", "report", "view"),
+    *("cache ls", "cache verify", "cache size", "data list"),
+)
 STEP_KEYS = ["product", "scene", "key", "state", "changed", "seconds"]
 
 

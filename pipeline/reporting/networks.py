@@ -1,0 +1,47 @@
+"""How the networks learnt: the loss curve of trained ones, what is written in the file of shipped ones."""
+
+import json
+from importlib.resources import as_file
+from typing import Any
+
+from safetensors import safe_open
+
+from pipeline.markup import Html, folded, table, tag, text
+from pipeline.plan import Planned
+from pipeline.reporting.gathered import Gathered
+from pipeline.reporting.pictures import svg
+from pipeline.shipped import weights_file
+from pipeline.views.figures import figure
+
+
+def networks(found: Gathered) -> Html:
+    """Return the part of the page about both networks."""
+    return "".join(_network(found, product, planned) for product, planned in found.networks.items())
+
+
+def _network(found: Gathered, product: str, planned: Planned) -> Html:
+    if "shipped" in planned.step.settings:
+        return _shipped(product)
+    drawn = figure(product, found.store.open(planned.key or ""), title=f"{product}: training loss")
+    return svg(drawn, f"Training loss of {product} over its steps")
+
+
+def _shipped(product: str) -> Html:
+    """Return what the package says of its own weights: they were trained elsewhere, and bring no curve."""
+    about = _metadata(product)
+    steps = f", trained in {about['steps']:,} steps" if "steps" in about else ""
+    loss = f" to a final loss of {about['loss']:.3f} (class-balanced cross-entropy, nats)" if "loss" in about else ""
+    told = tag("p", text(f"{product}: the weights that come with the package{steps}{loss}."))
+    parts = about.get("configuration", {}).items()
+    settings = [[f"{part}.{name}", value] for part, fields in parts for name, value in fields.items()]
+    if not settings:
+        return told
+    caption = f"Settings of the training of {product}"
+    return told + folded(f"How {product} was trained", table(["setting", "value"], settings, caption=caption, words=2))
+
+
+def _metadata(product: str) -> dict[str, Any]:
+    """Return what the file of the shipped weights says of how they were made."""
+    with as_file(weights_file(product)) as path, safe_open(path, framework="numpy") as file:
+        written: dict[str, str] = file.metadata() or {}
+    return {name: json.loads(value) for name, value in written.items() if name != "product"}

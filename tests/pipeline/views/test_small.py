@@ -1,0 +1,22 @@
+import numpy as np
+import pytest
+
+from pipeline.steps import PRODUCTS as ALL_PRODUCTS
+from pipeline.views.small import small_disparity, small_picture
+from tests.pipeline.views.products import PRODUCTS
+
+MAPS = {"images", "truth", "disparity", "semidense", "confidence"}
+
+
+@pytest.mark.parametrize("product", ALL_PRODUCTS)
+def test_maps_have_a_picture_and_nothing_else(product: str) -> None:
+    picture = small_picture(product, PRODUCTS[product]())
+    assert (picture is not None) == (product in MAPS)
+    if picture:
+        assert (picture.rgb.shape, picture.rgb.dtype) == ((4, 6, 3), np.uint8)
+
+
+def test_none_is_black_and_told() -> None:
+    picture = small_disparity(np.array([[np.nan, 3.0]], np.float32))
+    assert picture.rgb[0, 0].tolist() == [0, 0, 0]
+    assert "black none (50.0 %)" in picture.legend

@@ -1,0 +1,76 @@
+"""The report in a real browser: light, dark, narrow, printed, and without a mouse."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.api import Task, sweep
+from pipeline.reporting import report
+from tests.system.conftest import NARROW, SCREENS, WIDE, Seen
+
+
+@pytest.fixture(scope="module")
+def address(trained_task: Task, tmp_path_factory: pytest.TempPathFactory) -> str:
+    return report(trained_task, tmp_path_factory.mktemp("page") / "report.html").as_uri()
+
+
+@pytest.mark.parametrize(
+    ("size", "scheme", "name"),
+    [(WIDE, "light", "wide"), (WIDE, "dark", "dark"), (NARROW, "light", "narrow")],
+    ids=["light", "dark", "narrow"],
+)
+def test_it_is_whole_and_fits(
+    look: Callable[..., Seen], address: str, size: tuple[int, int], scheme: str, name: str
+) -> None:
+    seen = look(address, size, scheme)
+    seen.keep(f"report-{name}")
+    assert seen.said == []
+    assert [url for url in seen.asked if not url.startswith(("file:", "data:"))] == []
+    assert seen.fits()
+    loaded = seen.page.evaluate("[...document.images].map((image) => image.complete && image.naturalWidth > 0)")
+    assert loaded
+    assert all(loaded)
+    body = "(({color, backgroundColor}) => [color, backgroundColor])(getComputedStyle(document.body))"
+    ink, paper = seen.page.evaluate(body)
+    assert brightness(ink) < brightness(paper) if scheme == "light" else brightness(ink) > brightness(paper)
+
+
+def brightness(colour: str) -> float:
+    """Return the mean of the numbers of ``rgb(r, g, b)``."""
+    return float(np.mean([int(part) for part in colour.removeprefix("rgb(").rstrip(")").split(",")]))
+
+
+def test_the_keyboard_zooms_and_moves_all_pictures(look: Callable[..., Seen], address: str) -> None:
+    page: Any = look(address).page
+    page.locator(".zoom input").first.focus()
+    for _ in range(4):
+        page.keyboard.press("ArrowRight")
+    assert page.locator(".zoom output").first.text_content() == "3x"
+    before = page.evaluate("document.querySelectorAll('.frame')[1].scrollLeft")
+    page.locator(".frame").first.focus()
+    page.keyboard.press("ArrowRight")
+    page.wait_for_function(f"document.querySelectorAll('.frame')[1].scrollLeft > {before}")
+    places = "[...document.querySelectorAll('.frame')].map((frame) => Math.round(frame.scrollLeft))"
+    page.wait_for_function(f"new Set({places}).size === 1")
+
+
+def test_print_shows_what_is_folded_and_no_controls(look: Callable[..., Seen], address: str) -> None:
+    page: Any = look(address).page
+    SCREENS.mkdir(parents=True, exist_ok=True)
+    assert page.pdf(path=SCREENS / "report.pdf")[:4] == b"%PDF"
+    page.emulate_media(media="print")
+    assert not page.locator(".zoom").first.is_visible()
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.evaluate("document.querySelectorAll('details:not([open])').length") == 0
+
+
+def test_the_curve_is_the_sweep_s(look: Callable[..., Seen], address: str, own_task: Task) -> None:
+    rows = [row for row in sweep(own_task, "0.3,0.5").metrics if row["mask"] == "nonocc" and row["threshold_px"] == 1]
+    page: Any = look(address).page
+    cells = "[...row.cells].map((cell) => cell.textContent).join(' ')"
+    told = page.evaluate(f"[...document.querySelectorAll('details tr')].map((row) => {cells})")
+    for row in rows:
+        if "bad" in row:  # else nothing is kept, and the curve has no point
+            assert f"{row['R']:g} {row['invalid']:.1f} {row['bad']:.2f}" in told

@@ -1,0 +1,252 @@
+"""The viewer in a real browser, over caches that were written by hand: a small one, and one of quarter size."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stages.filtering import keep_confident
+from stages.metrics import avgerr, bad, invalid, rms
+from tests.handmade import Handmade, handmade, judge
+from tests.system.conftest import NARROW, WIDE, Seen, serving
+
+pytest.importorskip("bokeh", reason="Bokeh is not installed: pip install -e .[dev]")
+SIZE, QUARTER = (60, 90), (500, 741)
+"""Rows and columns of the scenes."""
+Look = Callable[..., Seen]
+
+
+@dataclass
+class Running:
+    """A viewer that is being served, and what its cache holds: the latest configuration first."""
+
+    address: str
+    pid: int
+    made: Handmade
+    confidences: list[Any]
+
+
+@contextmanager
+def running(cache: Path, size: tuple[int, int], disparities: int) -> Iterator[Running]:
+    made = handmade(cache, *size, disparities)
+    first = made.arrays["confidence"]["confidence"]
+    judge(made, first[::-1].copy(), 1)
+    with serving(made.store.root) as (address, pid):
+        yield Running(address, pid, made, [made.arrays["confidence"]["confidence"], first])
+
+
+def visit(look: Look, served: Running, size: tuple[int, int] = WIDE) -> Seen:
+    """Open the viewer, and wait until its first scene is there."""
+    seen = look(served.address, size)
+    seen.page.wait_for_function("window.Bokeh && Bokeh.documents.length && Bokeh.documents[0].is_idle")
+    seen.page.wait_for_function(f"{model('told')} && {model('told')}.text.includes('rms')")
+    return seen
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory, look: Look) -> Iterator[Running]:
+    with running(tmp_path_factory.mktemp("small") / "cache", SIZE, 12) as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def large(tmp_path_factory: pytest.TempPathFactory, look: Look) -> Iterator[Running]:
+    with running(tmp_path_factory.mktemp("large") / "cache", QUARTER, 70) as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def seen(look: Look, small: Running) -> Seen:
+    """The small cache's page, which the tests share: each sets what it needs."""
+    return visit(look, small)
+
+
+@pytest.fixture(scope="module")
+def seen_large(look: Look, large: Running) -> Seen:
+    return visit(look, large)
+
+
+def model(name: str) -> str:
+    """Return the code that finds a model of the page."""
+    return f"Bokeh.documents[0].get_model_by_name('{name}')"
+
+
+def array(seen: Seen, source: str, column: str) -> NDArray[np.float32]:
+    """Return a map as the browser has it; NaN travels as null."""
+    data = seen.page.evaluate(f"[...{model(source)}.data.{column}[0]].map((v) => Number.isFinite(v) ? v : null)")
+    return np.array([np.nan if value is None else value for value in data], np.float32)
+
+
+def set_threshold(seen: Seen, value: float) -> None:
+    seen.page.evaluate(f"{model('R')}.value = {value}")
+
+
+def told(seen: Seen) -> dict[str, str]:
+    """Return the figures that the page tells."""
+    code = f"""(() => {{ const box = document.createElement('div'); box.innerHTML = {model("told")}.text;
+        return Object.fromEntries([...box.querySelectorAll('b[id]')].map((b) => [b.id, b.textContent])) }})()"""
+    found: dict[str, str] = seen.page.evaluate(code)
+    return {name: value.split()[0] for name, value in found.items() if name}
+
+
+def box(seen: Seen, name: str) -> dict[str, float]:
+    """Return where a figure is on the screen."""
+    view = f"Bokeh.index.find_one({model(name)})"
+    code = f"(() => {{ const r = {view}.el.getBoundingClientRect(); return [r.x, r.y, r.width, r.height] }})()"
+    return dict(zip("xywh", seen.page.evaluate(code), strict=True))
+
+
+def click(seen: Seen, name: str, y: int, x: int, size: tuple[int, int] = SIZE) -> None:
+    """Click on the pixel of a map that shows the whole image."""
+    at = box(seen, name)
+    seen.page.mouse.click(at["x"] + (x + 0.5) / size[1] * at["w"], at["y"] + (y + 0.5) / size[0] * at["h"])
+
+
+@pytest.mark.parametrize(("size", "name"), [(WIDE, "wide"), (NARROW, "narrow")], ids=["1280 x 800", "narrow"])
+def test_it_loads_and_fits_and_asks_nobody_else(look: Look, small: Running, size: tuple[int, int], name: str) -> None:
+    seen = visit(look, small, size)
+    seen.page.wait_for_timeout(500)
+    seen.keep(f"viewer-{name}")
+    assert seen.said == []
+    assert seen.fits()
+    own = (small.address, "data:", small.address.replace("http", "ws"))
+    assert [url for url in seen.asked if not url.startswith(own)] == []
+    names = ("left", "truth", "raw", "confidence", "kept", "error")
+    shapes = [box(seen, each)["w"] / box(seen, each)["h"] for each in names]
+    assert shapes == pytest.approx([SIZE[1] / SIZE[0]] * 6, rel=0.02), "pixels are square"
+
+
+@pytest.mark.parametrize("R", [0.0, 0.5, 0.77, 1.0])
+def test_the_slider_changes_map_and_figures(seen: Seen, small: Running, R: float) -> None:
+    arrays = small.made.arrays
+    set_threshold(seen, R)
+    disparity, truth, nonocc = arrays["disparity"]["disparity"], arrays["truth"]["disparity"], arrays["truth"]["nonocc"]
+    kept = keep_confident(disparity, small.confidences[0], R)
+    np.testing.assert_array_equal(array(seen, "kept-data", "disparity"), kept.ravel())
+    if np.isfinite(kept).any():
+        assert told(seen) == {
+            "bad": f"{bad(kept, truth, nonocc, 1):.2f}",
+            "invalid": f"{invalid(kept, truth, nonocc):.2f}",
+            "avgerr": f"{avgerr(kept, truth, nonocc):.3f}",
+            "rms": f"{rms(kept, truth, nonocc):.3f}",
+        }
+        point = seen.page.evaluate(f"{model('point')}.data")
+        assert point["invalid"][0] == pytest.approx(invalid(kept, truth, nonocc))
+    else:
+        assert told(seen)["bad"] == "none"
+
+
+def test_the_keyboard_moves_the_slider(seen: Seen) -> None:
+    set_threshold(seen, 0.9)
+    seen.page.locator(".noUi-handle").first.press("ArrowLeft")
+    seen.page.wait_for_function(f"Math.abs({model('R')}.value - 0.89) < 1e-9")
+    assert "0.89" in seen.page.evaluate(f"{model('told')}.text")
+
+
+def test_a_click_shows_the_costs_of_the_pixel(seen: Seen, small: Running) -> None:
+    y, x = 31, 52
+    click(seen, "raw", y, x)
+    seen.page.wait_for_function(f"{model('pixel')}.text.includes('raw disparity')")
+    shown_y, shown_x = (seen.page.evaluate(f"{model(name)}.value") for name in ("y", "x"))
+    assert max(abs(shown_y - y), abs(shown_x - x)) <= 1
+    cost = small.made.arrays["costvolume"]["cost"][shown_y, shown_x].astype(np.float32)
+    curve = seen.page.evaluate(f"[...{model('cost-curve')}.data.cost]")
+    np.testing.assert_array_equal(np.array(curve, np.float32), cost)
+    assert seen.page.evaluate(f"[...{model('cost-marks')}.data.d]")[0] == np.nanargmin(cost)
+    seen.page.wait_for_timeout(300)
+    seen.keep("viewer-pixel")
+    assert seen.said == []
+
+
+def test_a_pixel_can_be_named_by_its_place(seen: Seen, small: Running) -> None:
+    seen.page.evaluate(f"{model('y')}.value = 10; {model('x')}.value = 77")
+    seen.page.wait_for_function(f"{model('pixel')}.text.includes('y = 10, x = 77')")
+    cost = small.made.arrays["costvolume"]["cost"][10, 77].astype(np.float32)
+    curve = seen.page.evaluate(f"[...{model('cost-curve')}.data.cost]")
+    np.testing.assert_array_equal(np.array(curve, np.float32), cost)
+
+
+def test_two_configurations_meet_at_the_line(seen: Seen, small: Running) -> None:
+    options = seen.page.evaluate(f"{model('compare')}.options")
+    assert len(options) == 3
+    seen.page.evaluate(f"{model('compare')}.value = {options[2]!r}")
+    seen.page.wait_for_function(f"{model('swiped-data')}.data.disparity[0].length > 1")
+    seen.page.evaluate(f"{model('show')}.active = 3; {model('swipe')}.value = 40")
+    shown = array(seen, "swiped-data", "confidence").reshape(SIZE)
+    edge = round(0.4 * SIZE[1])
+    np.testing.assert_array_equal(shown[:, :edge], small.confidences[0][:, :edge])
+    np.testing.assert_array_equal(shown[:, edge:], small.confidences[1][:, edge:])
+    seen.page.wait_for_timeout(500)
+    seen.keep("viewer-swipe")
+    assert seen.said == []
+
+
+def test_maps_zoom_together(seen: Seen) -> None:
+    seen.page.get_by_role("button", name="+").click()
+    width = seen.page.evaluate(f"{model('across')}.end - {model('across')}.start")
+    assert width == pytest.approx(SIZE[1] / 1.5)
+    seen.page.get_by_role("button", name="whole image").click()
+    assert seen.page.evaluate(f"{model('across')}.end - {model('across')}.start") == SIZE[1]
+
+
+@pytest.fixture
+def quiet() -> None:
+    """Times are those of a machine that has nothing else to do."""
+    load, cores = os.getloadavg()[0], os.cpu_count() or 1
+    if load > cores:
+        pytest.skip(f"the machine is busy, load {load:.1f} on {cores} cores: times would say nothing of the viewer")
+
+
+@pytest.mark.usefixtures("quiet")
+def test_the_slider_answers_in_150_ms(seen_large: Seen) -> None:
+    """From the change of the value to other pixels on the screen, on the canvas of the filtered map."""
+    code = f"""async () => {{
+        const canvas = Bokeh.index.find_one({model("kept")}).canvas_view.primary
+        const middle = () => canvas.ctx.getImageData(0, canvas.canvas.height >> 1, canvas.canvas.width, 1).data.join()
+        const frame = () => new Promise(requestAnimationFrame), times = []
+        for (const R of [0.3, 0.6, 0.4, 0.7, 0.5, 0.8, 0.35]) {{
+            const before = middle(), start = performance.now()
+            {model("R")}.value = R
+            while (middle() === before) await frame()
+            times.push(performance.now() - start)
+            await frame()
+        }}
+        return times
+    }}"""
+    times = seen_large.page.evaluate(code)
+    assert median(times) < 150, times
+
+
+@pytest.mark.usefixtures("quiet")
+def test_a_click_answers_in_300_ms(seen_large: Seen) -> None:
+    """From the button's release to the curve of the pixel in the browser, the server's part included."""
+    seen_large.page.evaluate("addEventListener('pointerup', () => { window.released = performance.now() }, true)")
+    times = []
+    for y, x in ((100, 100), (250, 400), (400, 600), (120, 500), (300, 200)):
+        click(seen_large, "raw", y, x, QUARTER)
+        arrived = f"""async () => {{
+            while (!{model("pixel")}.text.includes('y = ') || {model("pixel")}.text === window.before)
+                await new Promise(requestAnimationFrame)
+            window.before = {model("pixel")}.text
+            await new Promise(requestAnimationFrame)
+            return performance.now() - window.released
+        }}"""
+        times.append(seen_large.page.evaluate(arrived))
+    assert median(times) < 300, times
+
+
+def test_memory_stays_under_a_gigabyte(seen_large: Seen, large: Running) -> None:
+    click(seen_large, "raw", 250, 300, QUARTER)
+    seen_large.page.wait_for_function(f"{model('pixel')}.text.includes('y = ')")
+    status = Path(f"/proc/{large.pid}/status")
+    if not status.is_file():
+        pytest.skip("this system does not tell the memory of a process")
+    peak = next(line for line in status.read_text().splitlines() if line.startswith("VmHWM"))
+    assert int(peak.split()[1]) * 1024 < 1e9
