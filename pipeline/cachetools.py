@@ -61,6 +61,10 @@ class Selection:
         return self == Selection()
 
 
+LONGEST = 60
+"""Letters of an entry's settings in a table."""
+
+
 def _only(entries: Iterable[Entry], start: str) -> Entry:
     found = [entry for entry in entries if entry.key.startswith(start)] if start else []
     if len(found) != 1:
@@ -82,14 +86,20 @@ def list_entries(folder: Path | None, selection: Selection, as_json: bool) -> No
         print_json({"entries": rows})
         return
     table = Table("product", "dataset", "scene", "size", "age", "last used", "made in", "key", "settings", box=None)
-    table.columns[-1].no_wrap = True
+    for column in table.columns:
+        column.no_wrap = True
     for entry in entries:
         label = [escape(entry.label.get(name, "")) for name in ("product", "dataset", "scene")]
         times = (_age(entry.created), _age(_used(store, entry)), f"{entry.seconds:.2f} s")
-        table.add_row(*label, bytes_text(entry.size), *times, entry.key[:12], escape(belonging.text(entry)))
+        table.add_row(*label, bytes_text(entry.size), *times, entry.key[:12], escape(_cut(belonging.text(entry))))
     console = results()
     console.print(table)
     console.print(f"{len(entries)} entries, {bytes_text(sum(entry.size for entry in entries))}")
+
+
+def _cut(text: str) -> str:
+    """Return a text that leaves the other columns their room; --json gives all of it."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
 
 
 def _used(store: Store, entry: Entry) -> str:

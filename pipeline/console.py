@@ -28,7 +28,7 @@ def print_json(value: Mapping[str, Any]) -> None:
 
 
 def step_rows(plan: Plan, made: Mapping[str, Made]) -> list[dict[str, Any]]:
-    """Return the rows that ``run`` and ``status`` promise to scripts: product, scene, key, state, changed, seconds."""
+    """Return the rows that ``run`` and ``status`` promise: product, scene, key, state, changed, why, seconds."""
     return [_step_row(planned, made.get(planned.step.id)) for planned in plan.steps]
 
 
@@ -42,7 +42,7 @@ def _step_row(planned: Planned, made: Made | None) -> dict[str, Any]:
         "state": state,
         "changed": [_change_row(change) for change in planned.changed],
         **({"damage": planned.damage} if planned.damage else {}),
-        **({"why": list(planned.causes)} if planned.causes else {}),
+        "why": list(planned.causes),
         "seconds": made.seconds if made else planned.seconds,
     }
 

@@ -18,7 +18,7 @@ COMMANDS = (
     *("run", "sweep", "status", "explain", "inspect", "report", "view"),
     *("cache ls", "cache verify", "cache size", "data list"),
 )
-STEP_KEYS = ["product", "scene", "key", "state", "changed", "seconds"]
+STEP_KEYS = ["product", "scene", "key", "state", "changed", "why", "seconds"]
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_a_plan_is_printed_and_nothing_made(invoke: Invoke, there: list[str], ho
     ran = invoke(*how, *there, "--set", "channels.rank_window=15")
     lines = [line.split() for line in ran.out.splitlines()]
     assert lines[0] == ["product", "scene", "state", "key", "why"]
-    assert [line[4:] for line in lines if line[0] == "channels"] == [["params.rank_window:", "31", "->", "15"]] * 3
+    assert [line[4:] for line in lines if line[0] == "channels"] == [["channels.rank_window:", "31", "->", "15"]] * 3
     assert lines[-1][:3] == ["reuses", "7", "products,"]
     found = only_object(invoke(*how, *there, "--set", "channels.rank_window=15", "--json").out)
     assert set(found) == {"steps", "metrics"}
@@ -124,7 +124,7 @@ def test_explain_as_json_is_the_recipe(invoke: Invoke, there: list[str], trained
     assert found["key"] == trained.find("costvolume", "test-0").key
     assert set(found["recipe"]) == {"stage", "code", "params", "inputs", "environment", "version"}
     assert found["recipe"]["inputs"]["matching_net"] == trained.find("matching_net").digest
-    assert found["extras"]["configuration"]["semidense"] == {"R": 0.9}
+    assert found["extras"]["configuration"]["semidense"] == {"R": 0.9, "density": None}
 
 
 @pytest.mark.parametrize("product", ["images", "channels", "costvolume", "disparity", "confidence", "semidense"])
@@ -163,9 +163,11 @@ def test_the_line_for_python_works(invoke: Invoke, there: list[str]) -> None:
 def test_cache_ls_lists_every_entry(invoke: Invoke, trained: Result) -> None:
     root = trained.store.root
     lines = invoke("cache", "ls", "--cache", root).out.splitlines()
-    assert len(lines) == 1 + len(list(trained.store.entries()))
+    assert len(lines) == 2 + len(list(trained.store.entries())), "a header, a line each, and how many there are"
     entries = only_object(invoke("cache", "ls", "--cache", root, "--json").out)["entries"]
-    assert set(entries[0]) == {"product", "dataset", "scene", "key", "digest", "created", "seconds", "size"}
+    assert set(entries[0]) == {
+        *("product", "dataset", "scene", "key", "digest", "created", "seconds", "size", "last_used", "settings")
+    }
 
 
 def test_cache_verify_finds_a_flipped_byte(invoke: Invoke, own_cache: Path) -> None:

@@ -29,7 +29,7 @@ ROW = {
 
 def test_a_row_of_a_plan_has_the_promised_keys() -> None:
     (row,) = console.step_rows(Plan((STALE,), ()), {})
-    assert list(row) == ["product", "scene", "key", "state", "changed", "seconds"]
+    assert list(row) == ["product", "scene", "key", "state", "changed", "why", "seconds"]
     assert row["changed"] == [{"field": "params.window", "old": 31, "new": 15}]
     assert (row["state"], row["seconds"]) == ("stale", None)
 

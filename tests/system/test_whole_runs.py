@@ -127,7 +127,11 @@ def test_the_number_of_workers_changes_no_key_and_no_digest(
 def test_one_row_a_tile_or_all_at_once_is_the_same(
     trained: Result, weights: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The runner's tiles of the real stages: other keys, since the tiling is in them, and the same numbers."""
+    """The runner's tiles of the real stages: other keys, since the tiling is in them, and the same numbers.
+
+    Costs as far as float16 tells: where a tile of transformed cells begins follows the runner's tile, and with it
+    the roundings.
+    """
     from pipeline import steps
 
     for rows in (13, 64):
@@ -139,7 +143,14 @@ def test_one_row_a_tile_or_all_at_once_is_the_same(
             found, expected = (
                 np.asarray(each.store.arrays(each.find(product, "test-0").key)[name][...]) for each in (result, trained)
             )
-            assert np.array_equal(found, expected, equal_nan=True), (product, rows)
+            if product == "costvolume":
+                assert np.array_equal(np.isnan(found), np.isnan(expected))
+                unit = 2.0**-10 * float(np.nanmax(np.abs(expected)))
+                assert np.nanmax(np.abs(found.astype(np.float64) - expected)) <= unit, rows
+            elif product == "disparity":
+                assert np.mean(found != expected) <= 0.001, "but for ties"
+            else:
+                assert np.array_equal(found, expected, equal_nan=True), (product, rows)
         array: zarr.Array = result.store.arrays(result.find("disparity").key)["disparity"]
         assert array.chunks[0] == min(rows, 64)
 
