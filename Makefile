@@ -22,7 +22,8 @@ train: $(READY)  ## DATA=DIR: train both networks on DIR/2001, 2003, 2005 and 20
 	$(BIN)/pipeline run middlebury:$(DATA) --train --upto evaluation_net --output build/weights
 	cp build/weights/*.safetensors stages/weights/
 
-bench: $(READY)  ## DATA=DIR (optional): bfloat16 against float32
+bench: $(READY)  ## DATA=DIR (optional): every benchmark of speed, then bfloat16 against float32
+	$(BIN)/python -m benchmarks
 	$(BIN)/python -m benchmarks.precision --rows 12 $(if $(DATA),middlebury:$(DATA)/MiddEval3/trainingQ,motorcycle)
 
 	$(BIN)/python -m benchmarks.guarding

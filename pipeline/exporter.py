@@ -89,9 +89,9 @@ class _Exporter:
         """Write the trained networks; shipped weights are files already."""
         for each in self.found:
             if each.product in NETS:
-                dataset = self.result.store.open(each.made.key)
-                if "loss" in dataset:
-                    data = _weights(self.result, each.made, dataset["parameters"].values, dataset["loss"].values)
+                arrays = self.result.store.arrays(each.made.key)
+                if "loss" in arrays:
+                    data = _weights(self.result, each.made, *(arrays[name][...] for name in ("parameters", "loss")))
                     self._write(self.folder / f"{each.stem}.safetensors", data)
 
     def write_maps(self) -> None:
@@ -119,7 +119,7 @@ class _Exporter:
         return self._spans[raw.id]
 
     def _read(self, made: Made, name: str) -> Any:  # noqa: ANN401
-        return self.result.store.open(made.key)[name].values
+        return self.result.store.arrays(made.key)[name][...]
 
     def write_metrics(self) -> None:
         """Write the rows of the figures, if the run went so far."""

@@ -3,14 +3,17 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
 from datasets.formats.atomic import atomic_write
 from pipeline.errors import UsageError
+
+if TYPE_CHECKING:  # an export of maps does without matplotlib's figures, which take a second to load
+    from matplotlib.figure import Figure
 
 
 @contextmanager
@@ -26,7 +29,7 @@ def explaining(path: Path) -> Iterator[None]:
         raise UsageError(f"{path}: cannot be written ({error.strerror or error}); name another place") from error
 
 
-def save_png(figure: Figure, path: Path) -> None:
+def save_png(figure: "Figure", path: Path) -> None:
     """Write a figure as PNG; an existing file is replaced, a reader sees the old one or the new one.
 
     Raises:

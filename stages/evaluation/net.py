@@ -29,8 +29,8 @@ from stages.evaluation.declaration import PATCH, STRIDE
 
 DISPARITY_UNIT = 5.0
 """Disparities, in px, are divided by this: one scale for all scenes, on which an error of 1 px still shows."""
-
-
+AT_ONCE = 2
+"""Fragments of a map, of 16 after two poolings, that go on together."""
 Pool = Callable[[Tensor], Tensor]
 """A way of pooling: (B, C, H, W) -> (a multiple of B, C, H // 2, W // 2)."""
 
@@ -58,7 +58,8 @@ class EvaluationNet(nn.Module):
             (B, 2, (H - 94) // 16 + 1, (W - 94) // 16 + 1): of a patch only its first 94 rows and columns
             need to lie on the map.
         """
-        return self._head(self._run(layers, lambda maps: functional.max_pool2d(maps, 2)))
+        gray, disparity = (self._early(half, _plain_pool) for half in _halves(layers))
+        return self._late(gray, disparity, _plain_pool)
 
     def dense(self, layers: Tensor) -> Tensor:
         """Return the log-odds that the disparity is right, for every patch of one pair of maps.
@@ -69,27 +70,36 @@ class EvaluationNet(nn.Module):
         Returns:
             (H - 100, W - 100) float32, at the patches' top left corners.
         """
-        logits = self._head(self._run(layers, fragments)).float()
+        gray, disparity = (torch.split(self._early(half, fragments), AT_ONCE) for half in _halves(layers))
+        # From here on no fragment meets another: a few at a time bound the memory.
+        parts = [self._late(*pair, fragments).float() for pair in zip(gray, disparity, strict=True)]
+        logits = torch.cat([part.reshape(STRIDE, -1, *part.shape[1:]) for part in parts], 1).flatten(0, 1)
         height, width = (length - PATCH + 1 for length in layers.shape[2:])
         return interleave(logits[:, 1] - logits[:, 0])[:height, :width]
 
-    def _run(self, layers: Tensor, pool: Pool) -> Tensor:
-        """Return conv4's output after its pooling, for a way of pooling."""
-        batch, _, height, width = layers.shape
-        # Layers go first, so that a pooling that multiplies the batch keeps the two apart.
-        maps = layers.transpose(0, 1).reshape(2 * batch, 1, height, width)
-        gray, disparity = (self._tower(half, pool) for half in maps.chunk(2))
-        return pool(functional.relu(self.conv4_gray(gray) + self.conv4_disparity(disparity)))
-
-    def _tower(self, maps: Tensor, pool: Pool) -> Tensor:
-        """Return the three convolutions that both layers go through."""
-        for conv in (self.conv1, self.conv2, self.conv3):
+    def _early(self, maps: Tensor, pool: Pool) -> Tensor:
+        """Return the first two convolutions of one layer: (B, 1, H, W) -> (B or 16 B, 32, ...)."""
+        for conv in (self.conv1, self.conv2):
             maps = pool(functional.relu(conv(maps)))
         return maps
+
+    def _late(self, gray: Tensor, disparity: Tensor, pool: Pool) -> Tensor:
+        """Return the logits from what ``_early`` made of the two layers."""
+        gray, disparity = (pool(functional.relu(self.conv3(maps))) for maps in (gray, disparity))
+        return self._head(pool(functional.relu(self.conv4_gray(gray) + self.conv4_disparity(disparity))))
 
     def _head(self, features: Tensor) -> Tensor:
         logits: Tensor = self.out(functional.relu(self.fc(features)))
         return logits
+
+
+def _halves(layers: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the two input layers, each (B, 1, H, W)."""
+    return layers[:, :1], layers[:, 1:]
+
+
+def _plain_pool(maps: Tensor) -> Tensor:
+    return functional.max_pool2d(maps, 2)
 
 
 def fragments(maps: Tensor) -> Tensor:

@@ -1,6 +1,7 @@
 """The figures of one scene: the product ``metrics`` and its rows for machines."""
 
-from collections.abc import Iterator
+import hashlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,10 @@ FIGURES = {
     "auc_optimal": ("float64", "1", "the area that a perfect confidence would reach"),
 }
 """Every figure of the product: dtype, unit, meaning. Those that know no threshold are the same at each."""
+_known: dict[bytes, list[list[dict[str, float]]]] = {}
+"""Figures of maps before filtering, by a hash of all that they are made from."""
+_MOST_KNOWN = 100
+
 ROW = ("raw_bad", "bad", "invalid", "avgerr", "rms", "auc", "auc_optimal")
 """The figures of a machine-readable row, in order."""
 
@@ -75,34 +80,59 @@ def compute_metrics(_: NoParams, inputs: Inputs) -> Arrays:
     for name, array in maps.items():
         require_equal(name, array, truth)
     masks = (maps.pop("nonocc"), np.ones(truth.shape, bool))
-    table = [list(_figures(**maps, truth=truth, mask=mask)) for mask in masks]
+    semidense = maps.pop("semidense")
+    raw = _raw_figures(**maps, truth=truth, masks=masks)
+    table = [
+        [cell | filtered for cell, filtered in zip(row, _filtered_figures(semidense, truth, mask), strict=True)]
+        for row, mask in zip(raw, masks, strict=True)
+    ]
     return {
         "threshold": np.array(THRESHOLDS),
         **{name: np.array([[cell[name] for cell in row] for row in table], FIGURES[name][0]) for name in FIGURES},
     }
 
 
-def _figures(
-    semidense: Array, disparity: Array, confidence: Array, truth: Array, mask: NDArray[np.bool_]
-) -> Iterator[dict[str, float]]:
-    """Yield the figures of one mask at each threshold."""
-    raw, filtered = Errors.of(disparity, truth, mask), Errors.of(semidense, truth, mask)
+def _raw_figures(
+    disparity: Array, confidence: Array, truth: Array, masks: Sequence[NDArray[np.bool_]]
+) -> list[list[dict[str, float]]]:
+    """Return the figures that no filtering changes, by mask and threshold.
+
+    Ranking the pixels is most of the work, and a sweep over R asks for the same each time: what was worked
+    out for these very arrays is taken again.
+    """
+    digest = hashlib.blake2b()
+    for array in (disparity, confidence, truth, masks[0]):
+        digest.update(f"{array.dtype}{array.shape}".encode())
+        digest.update(array.tobytes())
+    found = _known.get(digest.digest())
+    if found is None:
+        found = [_raw_of_mask(disparity, confidence, truth, mask) for mask in masks]
+        if len(_known) >= _MOST_KNOWN:
+            _known.clear()
+        _known[digest.digest()] = found
+    return found
+
+
+def _raw_of_mask(disparity: Array, confidence: Array, truth: Array, mask: NDArray[np.bool_]) -> list[dict[str, float]]:
+    """Return the figures of the map before filtering, at each threshold."""
+    raw = Errors.of(disparity, truth, mask)
     ranking = Ranking.of(confidence[counted(truth, mask)])
-    same: dict[str, float] = {
-        "pixels": raw.absolute.size,
-        "invalid": filtered.invalid(),
-        "avgerr": filtered.avgerr(),
-        "rms": filtered.rms(),
-        **filtered.quantiles(),
-    }
-    for threshold in THRESHOLDS:
-        raw_bad = raw.raw_bad(threshold)
-        yield same | {
-            "raw_bad": raw_bad,
-            "bad": filtered.bad(threshold),
+    return [
+        {
+            "pixels": raw.absolute.size,
+            "raw_bad": raw.raw_bad(threshold),
             "auc": ranking.auc(raw.absolute <= threshold),
-            "auc_optimal": optimal_auc(raw_bad / 100),
+            "auc_optimal": optimal_auc(raw.raw_bad(threshold) / 100),
         }
+        for threshold in THRESHOLDS
+    ]
+
+
+def _filtered_figures(semidense: Array, truth: Array, mask: NDArray[np.bool_]) -> list[dict[str, float]]:
+    """Return the figures of the filtered map, at each threshold."""
+    filtered = Errors.of(semidense, truth, mask)
+    same = {"invalid": filtered.invalid(), "avgerr": filtered.avgerr(), "rms": filtered.rms(), **filtered.quantiles()}
+    return [same | {"bad": filtered.bad(threshold)} for threshold in THRESHOLDS]
 
 
 METRICS = Stage(

@@ -17,7 +17,9 @@ from stages.metrics import (
     optimal_auc,
     raw_bad,
     rms,
+    stage,
 )
+from stages.metrics.stage import compute_metrics as compute
 from stages.stage import NoParams, StageError
 from tests.stages.tiling import same
 
@@ -135,3 +137,31 @@ def test_refuses_another_shape(product: str, array: str) -> None:
     name = array if array == "nonocc" else product
     with pytest.raises(StageError, match=rf"{name} has shape \(39, 30\), the ground truth \(40, 30\)"):
         METRICS.function()(NoParams(), given)
+
+
+def test_a_sweep_ranks_the_pixels_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    ranked = []
+    plain = stage.Ranking.of
+    monkeypatch.setattr(stage, "_known", {})
+    monkeypatch.setattr(stage.Ranking, "of", lambda confidence: ranked.append(confidence) or plain(confidence))
+    made = [compute(NoParams(), products(R)) for R in (0.2, 0.5, 0.8)]
+    assert len(ranked) == len(MASKS)
+    assert not np.array_equal(made[0]["invalid"], made[1]["invalid"])
+    monkeypatch.setattr(stage, "_known", {})
+    assert same(made[2], compute(NoParams(), products(0.8)))
+
+
+@pytest.mark.parametrize(
+    ("product", "name"),
+    [("disparity", "disparity"), ("confidence", "confidence"), ("truth", "disparity"), ("truth", "nonocc")],
+)
+def test_what_was_ranked_for_other_arrays_is_not_taken(
+    product: str, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, other = products(), products()
+    other[product][name] = np.flipud(other[product][name]).copy()
+    compute(NoParams(), before)
+    after = compute(NoParams(), other)
+    monkeypatch.setattr(stage, "_known", {})
+    assert same(after, compute(NoParams(), other))
+    assert not np.array_equal(after["auc"], compute(NoParams(), before)["auc"])

@@ -1,0 +1,41 @@
+"""evaluation-Net at every pixel against patch by patch: ``python -m benchmarks.evaluation``.
+
+Patches are run in batches of 64, as training would; the sides differ in the number of pixels, so the ratio is of
+pixels a second. A patch answers for one pixel.
+"""
+
+import numpy as np
+import torch
+
+from benchmarks.harness import compare, report
+from stages.evaluation.confidence import confidence
+from stages.evaluation.declaration import PATCH
+from stages.evaluation.net import EvaluationNet
+from stages.parameters import initialise
+from stages.training import one_thread
+
+SIZE = (128, 192)
+PATCHES = 64
+
+
+def main() -> None:
+    """Compare on noise: the arithmetic does not depend on what is seen. One thread on both sides."""
+    one_thread()
+    net = EvaluationNet()
+    initialise(net, 0)
+    layers = np.random.default_rng(0).normal(size=(2, *SIZE)).astype(np.float32)
+    patches = torch.randn(PATCHES, 2, PATCH, PATCH)
+
+    def single() -> None:
+        with torch.inference_mode():
+            net(patches)
+
+    work = SIZE[0] * SIZE[1] / PATCHES
+    report(
+        "evaluation",
+        [compare("evaluation-Net, times patch by patch", lambda: confidence(net, layers), single, 50, work=work)],
+    )
+
+
+if __name__ == "__main__":
+    main()
