@@ -9,6 +9,22 @@ import typer
 
 from pipeline import cli_match, cli_view
 from pipeline.cli_cache import cache_app
+from pipeline.cli_options import (
+    CacheOption,
+    ConfigOption,
+    DatasetArgument,
+    DryRunOption,
+    ForceOption,
+    JsonOption,
+    OutputOption,
+    ProductArgument,
+    SceneOption,
+    SchedulerOption,
+    SetOption,
+    TrainOption,
+    UptoOption,
+    WorkersOption,
+)
 
 if TYPE_CHECKING:
     from pipeline.api import Result, Task
@@ -26,29 +42,6 @@ data_app = typer.Typer(help="Look at datasets.", no_args_is_help=True)
 app.add_typer(cache_app, name="cache")
 app.add_typer(data_app, name="data")
 cli_match.register(app)
-
-DatasetArgument = Annotated[str, typer.Argument(help="Such as motorcycle or middlebury:DIR; see `pipeline data list`.")]
-SceneOption = Annotated[list[str] | None, typer.Option("--scene", help="Only this scene; may be repeated.")]
-SetOption = Annotated[list[str] | None, typer.Option("--set", help="section.field=value; may be repeated.")]
-ConfigOption = Annotated[Path | None, typer.Option("--config", help="A TOML file with the same sections.")]
-CacheOption = Annotated[
-    Path | None, typer.Option("--cache", help="The cache's folder [default: $PIPELINE_CACHE, else the user's].")
-]
-TrainOption = Annotated[bool, typer.Option("--train", help="Train the networks; the shipped weights are not used.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else, on stdout.")]
-OutputOption = Annotated[
-    Path | None, typer.Option("--output", "-o", help="Write maps, metrics and configuration to this folder.")
-]
-SchedulerOption = Annotated[
-    str | None, typer.Option("--scheduler", help="A Dask scheduler, tcp://HOST:PORT; the cache must be shared.")
-]
-WorkersOption = Annotated[int | None, typer.Option("--workers", min=1, help="Threads [default: one a core].")]
-UptoOption = Annotated[str, typer.Option("--upto", help="The product to stop at.")]
-ForceOption = Annotated[
-    list[str] | None, typer.Option("--force", help="Make this product again, and compare; may be repeated.")
-]
-DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Only say what would be reused and made.")]
-ProductArgument = Annotated[str, typer.Argument(help="Such as costvolume, disparity or confidence.")]
 
 
 @app.command()

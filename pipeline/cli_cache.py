@@ -5,22 +5,20 @@ from typing import Annotated
 
 import typer
 
+from pipeline.cli_options import CacheOption, JsonOption
+
 cache_app = typer.Typer(help="Look into the cache, check, clean and share it.", no_args_is_help=True)
 
-CacheOption = Annotated[
-    Path | None, typer.Option("--cache", help="The cache's folder [default: $PIPELINE_CACHE, else the user's].")
-]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else, on stdout.")]
 KeysArgument = Annotated[list[str] | None, typer.Argument(metavar="[KEY]...", help="Keys, or the start of them.")]
 ProductOption = Annotated[str | None, typer.Option("--product", help="Only entries of this product.")]
-SceneOption = Annotated[str | None, typer.Option("--scene", help="Only entries of this scene.")]
+OnlySceneOption = Annotated[str | None, typer.Option("--scene", help="Only entries of this scene.")]
 
 
 @cache_app.command("ls")
 def cache_ls(
     keys: KeysArgument = None,
     product: ProductOption = None,
-    scene: SceneOption = None,
+    scene: OnlySceneOption = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -34,7 +32,7 @@ def cache_ls(
 def cache_verify(
     keys: KeysArgument = None,
     product: ProductOption = None,
-    scene: SceneOption = None,
+    scene: OnlySceneOption = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -85,7 +83,7 @@ def cache_export(
     archive: Annotated[Path, typer.Argument(help="The file to write, such as volumes.tar.")],
     keys: KeysArgument = None,
     product: ProductOption = None,
-    scene: SceneOption = None,
+    scene: OnlySceneOption = None,
     inputs: Annotated[bool, typer.Option("--inputs", help="Also all that the entries were made from.")] = False,
     cache: CacheOption = None,
     as_json: JsonOption = False,

@@ -7,6 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipeline.cli_options import (
+    CacheOption,
+    ConfigOption,
+    DryRunOption,
+    JsonOption,
+    SchedulerOption,
+    SetOption,
+    WorkersOption,
+)
+
 if TYPE_CHECKING:
     from pipeline.api import Task
     from pipeline.pairs import Match, Wishes
@@ -46,13 +56,13 @@ def match(
     scene: Annotated[
         list[str] | None, typer.Option("--scene", help="Only this pair of several; may be repeated.")
     ] = None,
-    settings: Annotated[list[str] | None, typer.Option("--set", help="section.field=value; may be repeated.")] = None,
-    config: Annotated[Path | None, typer.Option("--config", help="A TOML file with the same sections.")] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be reused and made.")] = False,
-    scheduler: Annotated[str | None, typer.Option("--scheduler", help="A Dask scheduler, tcp://HOST:PORT.")] = None,
-    workers: Annotated[int | None, typer.Option("--workers", min=1, help="Threads [default: one a core].")] = None,
-    cache: Annotated[Path | None, typer.Option("--cache", help="The cache's folder.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+    settings: SetOption = None,
+    config: ConfigOption = None,
+    dry_run: DryRunOption = False,
+    scheduler: SchedulerOption = None,
+    workers: WorkersOption = None,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Match your own rectified pair, or many: disparities, confidence, depth and points as files."""
     from datasets.pair import PairOptions, pair_spec

@@ -5,14 +5,7 @@ from typing import Annotated
 
 import typer
 
-DatasetArgument = Annotated[str, typer.Argument(help="Such as motorcycle or middlebury:DIR; see `pipeline data list`.")]
-SceneOption = Annotated[list[str] | None, typer.Option("--scene", help="Only this scene; may be repeated.")]
-SetOption = Annotated[list[str] | None, typer.Option("--set", help="section.field=value; may be repeated.")]
-ConfigOption = Annotated[Path | None, typer.Option("--config", help="A TOML file with the same sections.")]
-CacheOption = Annotated[
-    Path | None, typer.Option("--cache", help="The cache's folder [default: $PIPELINE_CACHE, else the user's].")
-]
-TrainOption = Annotated[bool, typer.Option("--train", help="Of a run that trained the networks.")]
+from pipeline.cli_options import CacheOption, ConfigOption, DatasetArgument, SceneOption, SetOption
 
 
 def register(app: typer.Typer) -> None:
@@ -27,7 +20,7 @@ def report(
     scene: SceneOption = None,
     settings: SetOption = None,
     config: ConfigOption = None,
-    train: TrainOption = False,
+    train: Annotated[bool, typer.Option("--train", help="Of a run that trained the networks.")] = False,
     cache: CacheOption = None,
 ) -> None:
     """Write one HTML file that shows all that is cached of a dataset: figures, curves, maps."""

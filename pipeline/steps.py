@@ -24,8 +24,6 @@ PACKAGES = ("pipeline", "stages", "datasets", "cache")
 NETS = ("matching_net", "evaluation_net")
 PRODUCTS = ("images", "truth", *STAGES)
 """Every product, in order; the names that ``--upto`` takes."""
-NOT_IN_KEYS = {"checkpoint_steps"}
-"""Settings that cannot change a result: work that is resumed comes out the same."""
 SPLIT = "training split"
 """Stands for a scene in steps that belong to all training scenes together."""
 
@@ -227,7 +225,7 @@ class _Builder:
 
     def _add_stage(self, stage: Stage, scene: SceneSource | None, inputs: Mapping[str, tuple[str, ...]]) -> str:
         params = resolved(self.config.section(stage.product), scene)
-        settings = params.model_dump(mode="json", exclude=NOT_IN_KEYS) | {"tiles": _tiles(stage, params)}
+        settings = params.model_dump(mode="json") | {"tiles": _tiles(stage, params)}
         return self._add(stage, scene, params, settings, inputs, code_parts(stage.module, PACKAGES))
 
     def _add(

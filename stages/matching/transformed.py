@@ -1,4 +1,4 @@
-"""conv3 and the compact head in the transformed domain (see ``winograd``): exact in float32, in a third of the time.
+"""conv3 and the compact head in the transformed domain (see ``winograd``): the same numbers by fewer products.
 
 A block of cells at one disparity goes through
 
@@ -10,7 +10,8 @@ A block of cells at one disparity goes through
     units      transform back, add the bias, cut at zero                          (y, x, 128)
 
 What goes into a product is written tile by tile, while the tile is in the cache; what comes out of it lies as
-batched matrix products write fastest. The channels of a number are side by side in both.
+batched matrix products write fastest. The channels of a number are side by side in both. How many there are is a
+constant in each kernel: only then does the compiler know that no index is negative, and make vector instructions.
 """
 
 from dataclasses import dataclass

@@ -20,6 +20,10 @@ from tests.system.conftest import NARROW, WIDE, Seen, serving
 pytest.importorskip("bokeh", reason="Bokeh is not installed: pip install -e .[dev]")
 SIZE, QUARTER = (60, 90), (500, 741)
 """Rows and columns of the scenes."""
+DOUBLE = 500
+"""Milliseconds after which a second click is one of its own, not the second half of a double click."""
+LONGEST = 10_000
+"""Milliseconds after which an answer is given up: it then counts as so late."""
 Look = Callable[..., Seen]
 
 
@@ -205,7 +209,7 @@ def quiet() -> None:
 
 
 @pytest.mark.usefixtures("quiet")
-def test_the_slider_answers_soon(seen_large: Seen) -> None:
+def test_the_slider_answers_in_150_ms(seen_large: Seen) -> None:
     """From the change of the value to other pixels on the screen, on the canvas of the filtered map."""
     code = f"""async () => {{
         const canvas = Bokeh.index.find_one({model("kept")}).canvas_view.primary
@@ -214,32 +218,35 @@ def test_the_slider_answers_soon(seen_large: Seen) -> None:
         for (const R of [0.3, 0.6, 0.4, 0.7, 0.5, 0.8, 0.35]) {{
             const before = middle(), start = performance.now()
             {model("R")}.value = R
-            while (middle() === before) await frame()
+            while (middle() === before && performance.now() < start + {LONGEST}) await frame()
             times.push(performance.now() - start)
             await frame()
         }}
         return times
     }}"""
     times = seen_large.page.evaluate(code)
-    assert median(times) < 1500, times  # ten times the aim: a loaded machine must not fail the suite
+    assert median(times) < 150, times
 
 
 @pytest.mark.usefixtures("quiet")
-def test_a_click_answers_soon(seen_large: Seen) -> None:
+def test_a_click_answers_in_300_ms(seen_large: Seen) -> None:
     """From the button's release to the curve of the pixel in the browser, the server's part included."""
     seen_large.page.evaluate("addEventListener('pointerup', () => { window.released = performance.now() }, true)")
     times = []
     for y, x in ((100, 100), (250, 400), (400, 600), (120, 500), (300, 200)):
+        seen_large.page.wait_for_timeout(DOUBLE)
         click(seen_large, "raw", y, x, QUARTER)
         arrived = f"""async () => {{
+            const late = performance.now() + {LONGEST}
             while (!{model("pixel")}.text.includes('y = ') || {model("pixel")}.text === window.before)
-                await new Promise(requestAnimationFrame)
+                if (performance.now() > late) break
+                else await new Promise(requestAnimationFrame)
             window.before = {model("pixel")}.text
             await new Promise(requestAnimationFrame)
             return performance.now() - window.released
         }}"""
         times.append(seen_large.page.evaluate(arrived))
-    assert median(times) < 3000, times  # ten times the aim, likewise
+    assert median(times) < 300, times
 
 
 def test_memory_stays_under_a_gigabyte(seen_large: Seen, large: Running) -> None:
