@@ -10,9 +10,9 @@ The verbs of the command line as functions; products come back as lazy xarray ob
 from importlib import import_module
 from typing import Any
 
-__all__ = ["Config", "Result", "Task", "explain", "export", "run", "status", "sweep"]
+__all__ = ["Config", "Result", "Task", "compare", "explain", "export", "run", "status", "sweep"]
 
-_HOMES = {"Config": "pipeline.config", "export": "pipeline.exporter"}
+_HOMES = {"Config": "pipeline.config", "compare": "pipeline.comparison", "export": "pipeline.exporter"}
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401

@@ -161,10 +161,10 @@ def run(
         StageFailed: a fault of a stage, with its cause.
     """
     task = Task(task) if isinstance(task, str) else task
-    return _run(task, task.request(upto), forced, watch, scheduler, workers)
+    return carry_out(task, task.request(upto), forced, watch, scheduler, workers)
 
 
-def _run(
+def carry_out(
     task: Task,
     request: Request,
     forced: Sequence[str],
@@ -172,6 +172,7 @@ def _run(
     scheduler: str | None,
     workers: int | None,
 ) -> Result:
+    """Make what a request asks for; see ``run``."""
     store = open_store(task.cache)
     plan = make_plan(request, store, forced)
     extras = provenance(sys.argv, next(iter(request.configs.values())).model_dump(mode="json"))
@@ -231,7 +232,7 @@ def sweep(
         for combination in itertools.product(*(_alternatives(setting) for setting in settings))
         for threshold in thresholds
     ]
-    return _run(task, task.request("metrics", variants), (), watch, scheduler, workers)
+    return carry_out(task, task.request("metrics", variants), (), watch, scheduler, workers)
 
 
 def _alternatives(setting: str) -> list[str]:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipeline.cli_compare import add_compare
+
 if TYPE_CHECKING:
     from pipeline.api import Result, Task
     from pipeline.plan import Plan
@@ -23,6 +25,7 @@ cache_app = typer.Typer(help="Look into the cache.", no_args_is_help=True)
 data_app = typer.Typer(help="Look at datasets.", no_args_is_help=True)
 app.add_typer(cache_app, name="cache")
 app.add_typer(data_app, name="data")
+add_compare(app)
 
 DatasetArgument = Annotated[str, typer.Argument(help="Such as motorcycle or middlebury:DIR; see `pipeline data list`.")]
 SceneOption = Annotated[list[str] | None, typer.Option("--scene", help="Only this scene; may be repeated.")]

@@ -8,7 +8,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from pydantic import ValidationError
@@ -116,7 +116,8 @@ class Request:
         configs: one configuration, or several of a sweep, by the name of the variant (empty for a single one).
         upto: the product to stop at.
         train: train the networks instead of taking the shipped weights.
-        training: the scenes to train on; needed with ``train``.
+        training: the scenes to train on; needed with ``train``, and for products that are always learnt.
+        also: further products of each scene that has a truth, beside ``upto``.
     """
 
     dataset: Dataset
@@ -124,6 +125,7 @@ class Request:
     upto: str = "metrics"
     train: bool = False
     training: tuple[SceneSource, ...] = ()
+    also: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a product that does not exist."""
@@ -165,7 +167,7 @@ def _targets(builder: "_Builder", trained_on: set[str]) -> Iterator[str]:
             notes.append(f"{scene.name} has no ground truth: there are no metrics for it")
             yield builder.product("images" if upto == "truth" else "semidense", scene)
         else:
-            yield builder.product(upto, scene)
+            yield from (builder.product(product, scene) for product in (upto, *builder.request.also))
 
 
 def _identity(scene: SceneSource) -> str:
@@ -238,7 +240,7 @@ class _Builder:
                 inputs=dict(inputs),
                 size=size,
                 code=dict(code),
-                environment=_environment(),
+                environment=_environment(stage),
                 R=threshold,
             )
         return step_id
@@ -277,9 +279,27 @@ def _tiles(stage: Stage, params: Params) -> str:
     return f"{stage.tile_rows} rows, halo {stage.halo(params)}, {stage.border}"
 
 
-def _environment() -> dict[str, str]:
-    """Return what changes bits besides code and settings: major versions, and the format of the arrays."""
-    return {"torch": version("torch").split(".")[0], "numpy": version("numpy").split(".")[0], "zarr_format": "3"}
+def _environment(stage: Stage) -> dict[str, str]:
+    """Return what changes bits besides code and settings: versions, and the format of the arrays."""
+    core = {"torch": version("torch").split(".")[0], "numpy": version("numpy").split(".")[0], "zarr_format": "3"}
+    if missing := missing_packages(stage):
+        raise UsageError(
+            f"{stage.product} needs {' and '.join(missing)}: pip install 'semidense-stereo[baselines]' brings it"
+        )
+    return core | {name: version(name) for name in stage.needs}
+
+
+def missing_packages(stage: Stage) -> tuple[str, ...]:
+    """Return the distributions that a stage needs and that are not installed."""
+    return tuple(name for name in stage.needs if not _installed(name))
+
+
+def _installed(distribution: str) -> bool:
+    try:
+        version(distribution)
+    except PackageNotFoundError:
+        return False
+    return True
 
 
 def training_scenes(dataset: Dataset) -> tuple[SceneSource, ...]:

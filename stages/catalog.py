@@ -4,6 +4,7 @@ The declarations stand beside what can be set for them; the functions that they 
 when something is computed.
 """
 
+from stages.baselines.declaration import BASELINES
 from stages.disparity_declaration import DISPARITY
 from stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
 from stages.filtering import SEMIDENSE
@@ -23,8 +24,9 @@ CATALOG: tuple[Stage, ...] = (
     CONFIDENCE,
     SEMIDENSE,
     METRICS,
+    *BASELINES,
 )
-"""The stages, in the order of the dataflow."""
+"""The stages, in the order of the dataflow; after them what they are compared with."""
 
 STAGES = {stage.product: stage for stage in CATALOG}
 """The stages by the name of their product."""

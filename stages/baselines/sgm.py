@@ -1,0 +1,56 @@
+"""Semi-global matching as OpenCV has it (SGBM), along eight paths."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.baselines.declaration import SgmParams
+from stages.stage import Arrays, Inputs
+from stages.transforms.gray import to_gray
+
+_UNITS = 16
+"""OpenCV's disparities are whole multiples of 1/16 px, and their number must be a multiple of 16 too."""
+_OFF = -1
+
+
+def match_semi_global(
+    left: NDArray[np.uint8], right: NDArray[np.uint8], params: SgmParams, *, checked: bool
+) -> NDArray[np.float32]:
+    """Return the disparity that OpenCV's SGBM finds in mode ``HH`` (eight paths).
+
+    Args:
+        left: (y, x) uint8.
+        right: (y, x) uint8.
+        params: range, block and penalties.
+        checked: drop what fails the left-right check or is not unique; without, every pixel is answered.
+
+    Returns:
+        (y, x) float32, px, in steps of 1/16; NaN where nothing is reported, as in the columns at the left whose
+        search would leave the right image.
+    """
+    import cv2
+
+    disparities = params.disparities
+    matcher = cv2.StereoSGBM.create(
+        minDisparity=disparities[0],
+        numDisparities=-(-len(disparities) // _UNITS) * _UNITS,
+        blockSize=params.window,
+        P1=params.p1,
+        P2=params.p2,
+        disp12MaxDiff=params.tolerance if checked else _OFF,
+        uniquenessRatio=params.uniqueness if checked else 0,
+        mode=cv2.STEREO_SGBM_MODE_HH,
+    )
+    found = matcher.compute(left, right).astype(np.float32) / _UNITS
+    return np.where(found < disparities[0], np.float32(np.nan), found)
+
+
+def compute_sgm(params: SgmParams, inputs: Inputs) -> Arrays:
+    """Compute the product ``sgm``; see ``match_semi_global``.
+
+    Source: Hirschmüller, "Stereo processing by semiglobal matching and mutual information", PAMI 2008.
+    """
+    left, right = (to_gray(inputs["images"][view]) for view in ("left", "right"))
+    return {
+        "dense": match_semi_global(left, right, params, checked=False),
+        "disparity": match_semi_global(left, right, params, checked=True),
+    }
