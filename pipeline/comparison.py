@@ -194,19 +194,19 @@ def _rows(result: Result, experiments: Sequence[str]) -> Iterator[Row]:
         products = _read(result, made)
         judged = Judged(scene, products["truth"])
         for experiment in experiments:
-            yield from _EXPERIMENT[experiment](judged, products)
+            yield from _EXPERIMENT[experiment](judged, products, made["semidense"].step.R)
 
 
-def _raw(judged: Judged, products: Mapping[str, Arrays]) -> Iterator[Row]:
+def _raw(judged: Judged, products: Mapping[str, Arrays], _: float | None) -> Iterator[Row]:
     yield from raw_rows(judged, f"{OURS}, shipped weights", products["disparity"]["disparity"])
     for method, product in MATCHERS.items():
         if product in products:
             yield from raw_rows(judged, method, products[product]["dense"])
 
 
-def _density(judged: Judged, products: Mapping[str, Arrays]) -> Iterator[Row]:
+def _density(judged: Judged, products: Mapping[str, Arrays], R: float | None) -> Iterator[Row]:
     ours: dict[str, NDArray[np.float32]] = {name: products[name][name] for name in ("disparity", "confidence")}
-    yield from density_rows(judged, OURS, products["semidense"]["disparity"])
+    yield from (row | {"R": R} for row in density_rows(judged, OURS, products["semidense"]["disparity"]))
     for method, product in MATCHERS.items():
         if product in products:
             rows = density_rows(judged, method, products[product]["disparity"])
@@ -214,7 +214,7 @@ def _density(judged: Judged, products: Mapping[str, Arrays]) -> Iterator[Row]:
     yield from curve_rows(judged, ours)
 
 
-def _auc(judged: Judged, products: Mapping[str, Arrays]) -> Iterator[Row]:
+def _auc(judged: Judged, products: Mapping[str, Arrays], _: float | None) -> Iterator[Row]:
     for method, (product, array) in MEASURES.items():
         if product in products:
             yield from auc_rows(judged, method, products[product][array], products["disparity"]["disparity"])

@@ -13,7 +13,7 @@ from typing import Literal
 from cache import ABSENT, Change, Entry, Recipe, Store, differences
 from pipeline.config import nearest
 from pipeline.errors import UsageError
-from pipeline.steps import PRODUCTS, Request, Step, build
+from pipeline.steps import ALL_PRODUCTS, Request, Step, build
 
 State = Literal["hit", "made", "stale", "missing"]
 PENDING = "to be made again"
@@ -77,9 +77,9 @@ def make_plan(request: Request, store: Store, forced: Iterable[str] = ()) -> Pla
         UsageError, DatasetError, StageError: if the request cannot be carried out.
         CacheUnavailable: if the cache cannot be read.
     """
-    unknown = sorted(set(forced) - set(PRODUCTS))
+    unknown = sorted(set(forced) - set(ALL_PRODUCTS))
     if unknown:
-        raise UsageError(f"no product {unknown[0]!r} to force; {nearest(unknown[0], PRODUCTS)}")
+        raise UsageError(f"no product {unknown[0]!r} to force; {nearest(unknown[0], ALL_PRODUCTS)}")
     graph = build(request)
     planner = _Planner(store, frozenset(forced))
     planned = tuple(planner.look_at(step) for step in graph.steps.values())

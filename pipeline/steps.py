@@ -18,14 +18,16 @@ from datasets import Dataset, SceneSource
 from pipeline import shipped, sources
 from pipeline.config import Config, nearest, one_line
 from pipeline.errors import UsageError
-from stages.catalog import STAGES
+from stages.catalog import CATALOG, STAGES
 from stages.precision import resolve
 from stages.stage import Params, Stage
 
 PACKAGES = ("pipeline", "stages", "datasets", "cache")
 NETS = ("matching_net", "evaluation_net")
-PRODUCTS = ("images", "truth", *STAGES)
-"""Every product, in order; the names that ``--upto`` takes."""
+PRODUCTS = ("images", "truth", *(stage.product for stage in CATALOG))
+"""The products of the dataflow, in order."""
+ALL_PRODUCTS = ("images", "truth", *STAGES)
+"""They and the baselines, in order; the names that ``--upto`` takes."""
 SPLIT = "training split"
 """Stands for a scene in steps that belong to all training scenes together."""
 
@@ -129,8 +131,8 @@ class Request:
 
     def __post_init__(self) -> None:
         """Refuse a product that does not exist."""
-        if self.upto not in PRODUCTS:
-            raise UsageError(f"no product {self.upto!r}; {nearest(self.upto, PRODUCTS)}")
+        if self.upto not in ALL_PRODUCTS:
+            raise UsageError(f"no product {self.upto!r}; {nearest(self.upto, ALL_PRODUCTS)}")
 
 
 def build(request: Request) -> Graph:
@@ -146,7 +148,7 @@ def build(request: Request) -> Graph:
         builder = _Builder(graph, config, request)
         graph.targets += [(step_id, variant) for step_id in _targets(builder, trained_on)]
     # The order of the products is one in which each comes after its inputs, whichever scenes they belong to.
-    in_order = sorted(graph.steps.items(), key=lambda item: PRODUCTS.index(item[1].product))
+    in_order = sorted(graph.steps.items(), key=lambda item: ALL_PRODUCTS.index(item[1].product))
     graph.steps = dict(in_order)
     graph.notes = list(dict.fromkeys(graph.notes))
     if not graph.targets:

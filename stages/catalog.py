@@ -24,9 +24,8 @@ CATALOG: tuple[Stage, ...] = (
     CONFIDENCE,
     SEMIDENSE,
     METRICS,
-    *BASELINES,
 )
-"""The stages, in the order of the dataflow; after them what they are compared with."""
+"""The stages, in the order of the dataflow."""
 
-STAGES = {stage.product: stage for stage in CATALOG}
-"""The stages by the name of their product."""
+STAGES = {stage.product: stage for stage in (*CATALOG, *BASELINES)}
+"""The stages by the name of their product; after those of the dataflow what they are compared with."""

@@ -33,9 +33,9 @@ def mc_cnn_costs(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities:
 
     views = (np.pad(view.astype(np.float32), _RADIUS, mode="edge") for view in (left, right))
     weights = resources.files("mc_cnn") / "weights" / _WEIGHTS
-    # The package's disparity has the other sign, so its last slice is our first.
-    costs = run_mc_cnn_fast(*views, -disparities[-1], -disparities[0], str(weights))[..., ::-1]
-    return np.asarray(costs[_RADIUS:-_RADIUS, _RADIUS:-_RADIUS], np.float32)
+    # The package answers where a patch lies within the view, here at every pixel of the view that was continued;
+    # its disparity has the other sign, so its last slice is our first.
+    return run_mc_cnn_fast(*views, -disparities[-1], -disparities[0], str(weights))[..., ::-1].astype(np.float32)
 
 
 def compute_mc_cnn(params: CheckedParams, inputs: Inputs) -> Arrays:

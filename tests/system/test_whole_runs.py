@@ -15,7 +15,7 @@ from pipeline import api
 from pipeline.api import Result, Task
 from pipeline.execute import totals
 from pipeline.steps import PRODUCTS
-from stages.catalog import STAGES
+from stages.catalog import CATALOG, STAGES
 
 Invoke = Callable[..., Any]
 
@@ -34,7 +34,7 @@ def test_a_run_makes_every_product_of_every_scene(trained: Result) -> None:
     assert made(trained) == dict.fromkeys(PRODUCTS, 1) | three
 
 
-@pytest.mark.parametrize("product", [name for name, stage in STAGES.items() if stage.scope == "scene"])
+@pytest.mark.parametrize("product", [stage.product for stage in CATALOG if stage.scope == "scene"])
 def test_every_array_is_as_declared(trained: Result, product: str) -> None:
     dataset = trained.open(product, "test-0")
     for output in STAGES[product].outputs:
