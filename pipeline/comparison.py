@@ -25,9 +25,10 @@ from pipeline.comparison_rows import (
     raw_rows,
 )
 from pipeline.config import Config, nearest
+from pipeline.environment import missing_packages
 from pipeline.errors import UsageError
 from pipeline.quoted import NAMED
-from pipeline.steps import Request, missing_packages, training_scenes
+from pipeline.steps import Request, training_scenes
 from pipeline.tasks import Made, Watch, read_arrays
 from stages.catalog import STAGES
 from stages.stage import Arrays

@@ -8,7 +8,6 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from pydantic import ValidationError
@@ -17,6 +16,7 @@ from cache import Recipe, code_parts
 from datasets import Dataset, SceneSource
 from pipeline import shipped, sources
 from pipeline.config import Config, nearest, one_line
+from pipeline.environment import environment
 from pipeline.errors import UsageError
 from stages.catalog import CATALOG, STAGES
 from stages.precision import resolve
@@ -242,7 +242,7 @@ class _Builder:
                 inputs=dict(inputs),
                 size=size,
                 code=dict(code),
-                environment=_environment(stage),
+                environment=environment(stage),
                 R=threshold,
             )
         return step_id
@@ -279,29 +279,6 @@ def _tiles(stage: Stage, params: Params) -> str:
     if stage.tile_rows is None:
         return "whole"
     return f"{stage.tile_rows} rows, halo {stage.halo(params)}, {stage.border}"
-
-
-def _environment(stage: Stage) -> dict[str, str]:
-    """Return what changes bits besides code and settings: versions, and the format of the arrays."""
-    core = {"torch": version("torch").split(".")[0], "numpy": version("numpy").split(".")[0], "zarr_format": "3"}
-    if missing := missing_packages(stage):
-        raise UsageError(
-            f"{stage.product} needs {' and '.join(missing)}: pip install 'semidense-stereo[baselines]' brings it"
-        )
-    return core | {name: version(name) for name in stage.needs}
-
-
-def missing_packages(stage: Stage) -> tuple[str, ...]:
-    """Return the distributions that a stage needs and that are not installed."""
-    return tuple(name for name in stage.needs if not _installed(name))
-
-
-def _installed(distribution: str) -> bool:
-    try:
-        version(distribution)
-    except PackageNotFoundError:
-        return False
-    return True
 
 
 def training_scenes(dataset: Dataset) -> tuple[SceneSource, ...]:

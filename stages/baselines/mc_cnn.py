@@ -35,7 +35,8 @@ def mc_cnn_costs(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities:
     weights = resources.files("mc_cnn") / "weights" / _WEIGHTS
     # The package answers where a patch lies within the view, here at every pixel of the view that was continued;
     # its disparity has the other sign, so its last slice is our first.
-    return run_mc_cnn_fast(*views, -disparities[-1], -disparities[0], str(weights))[..., ::-1].astype(np.float32)
+    costs = run_mc_cnn_fast(*views, -disparities[-1], -disparities[0], str(weights))
+    return np.ascontiguousarray(costs[..., ::-1], np.float32)
 
 
 def compute_mc_cnn(params: CheckedParams, inputs: Inputs) -> Arrays:

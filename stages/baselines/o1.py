@@ -113,10 +113,15 @@ def _flatten(trees: list[Any]) -> dict[str, NDArray[Any]]:
         "root": root.astype(np.int32),
         "feature": np.concatenate([tree.feature for tree in trees]).astype(np.int32),
         "threshold": np.concatenate([tree.threshold for tree in trees]),
-        "lower": np.concatenate([tree.children_left + first for tree, first in zip(trees, root, strict=True)]),
-        "upper": np.concatenate([tree.children_right + first for tree, first in zip(trees, root, strict=True)]),
+        "lower": _children([tree.children_left for tree in trees], root),
+        "upper": _children([tree.children_right for tree in trees], root),
         "right": np.concatenate(shares).astype(np.float32),
     }
+
+
+def _children(trees: list[NDArray[Any]], root: NDArray[Any]) -> NDArray[np.int32]:
+    """Return the children of each tree's nodes, counted over all trees."""
+    return np.concatenate([nodes + first for nodes, first in zip(trees, root, strict=True)]).astype(np.int32)
 
 
 def forest_confidence(forest: Arrays, features: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -130,8 +135,16 @@ def forest_confidence(forest: Arrays, features: NDArray[np.float32]) -> NDArray[
         (sample,) float32 in [0, 1].
     """
     result = np.empty(len(features), np.float32)
-    names = ("root", "feature", "threshold", "lower", "upper", "right")
-    _descend(features, *(np.ascontiguousarray(forest[name]) for name in names), result)
+    _descend(
+        features,
+        forest["root"],
+        forest["feature"],
+        forest["threshold"],
+        forest["lower"],
+        forest["upper"],
+        forest["right"],
+        result,
+    )
     return result
 
 

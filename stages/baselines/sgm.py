@@ -21,15 +21,18 @@ def match_semi_global(
         left: (y, x) uint8.
         right: (y, x) uint8.
         params: range, block and penalties.
-        checked: drop what fails the left-right check or is not unique; without, every pixel is answered.
+        checked: drop what fails the left-right check or is not unique, as OpenCV does it: nothing is said in a band at
+            the border whose search would leave the right image. Without, the views are continued by their edge, and
+            every pixel is answered.
 
     Returns:
-        (y, x) float32, px, in steps of 1/16; NaN where nothing is reported, as in the columns at the left whose
-        search would leave the right image.
+        (y, x) float32, px, in steps of 1/16; NaN where nothing is reported.
     """
     import cv2
 
     disparities = params.disparities
+    margin = 0 if checked else max(abs(disparities[0]), abs(disparities[-1])) + _UNITS
+    left, right = (np.pad(view, ((0, 0), (margin, margin)), mode="edge") for view in (left, right))
     matcher = cv2.StereoSGBM.create(
         minDisparity=disparities[0],
         numDisparities=-(-len(disparities) // _UNITS) * _UNITS,
@@ -40,7 +43,7 @@ def match_semi_global(
         uniquenessRatio=params.uniqueness if checked else 0,
         mode=cv2.STEREO_SGBM_MODE_HH,
     )
-    found = matcher.compute(left, right).astype(np.float32) / _UNITS
+    found = matcher.compute(left, right)[:, margin : left.shape[1] - margin].astype(np.float32) / _UNITS
     return np.where(found < disparities[0], np.float32(np.nan), found)
 
 

@@ -13,9 +13,9 @@ from pipeline import compare
 from pipeline.api import Task
 from pipeline.comparison import ABLATION, EXPERIMENTS, MATCHERS, MEASURES, Comparison
 from pipeline.comparison_report import COLUMNS, print_comparison, write_comparison
+from pipeline.environment import missing_packages
 from pipeline.errors import UsageError
 from pipeline.quoted import NAMED, QUOTED
-from pipeline.steps import missing_packages
 from stages.catalog import STAGES
 from tests.tiny import SETTINGS, SPEC, TEST_ONLY
 
@@ -89,9 +89,9 @@ def test_what_needs_training_says_so_without_a_training_set(found: Comparison, t
 
 
 def test_without_a_package_its_rows_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    from pipeline import comparison, steps
+    from pipeline import comparison, environment
 
-    monkeypatch.setattr(steps, "_installed", lambda _: False)
+    monkeypatch.setattr(environment, "_installed", lambda _: False)
     products, unavailable = comparison._available(EXPERIMENTS, True)
     reasons = {each["method"]: each["why"] for each in unavailable}
     assert products == ("sncc", "census", "cost_confidence", "ccnn")
@@ -133,6 +133,15 @@ def test_a_mistake_is_one_line_and_writes_nothing(
     ran = invoke("compare", TEST_ONLY, *arguments, "-o", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
     assert ran.code == 2 and message in ran.err and len(ran.err.splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_single_baseline_without_its_package_is_refused(monkeypatch: pytest.MonkeyPatch, task: Task) -> None:
+    from pipeline import environment
+    from pipeline.api import status
+
+    monkeypatch.setattr(environment, "_installed", lambda _: False)
+    with pytest.raises(UsageError, match=r"sgm needs opencv-python-headless: pip install"):
+        status(task, "sgm")
 
 
 def test_training_is_asked_for_in_one_way_alone(task: Task) -> None:
