@@ -53,10 +53,11 @@ class WindowParams(CheckedParams):
 class SgmParams(RangeParams):
     """OpenCV's semi-global block matching."""
 
-    window: int = Field(5, ge=1, le=11, description="side of the matched block, px, odd")
-    p1: int = Field(200, ge=0, description="penalty of a step of 1 px between neighbours")
-    p2: int = Field(800, ge=1, description="penalty of a larger step; above p1")
+    window: int = Field(3, ge=1, le=11, description="side of the matched block, px, odd")
+    p1: int = Field(72, ge=0, description="penalty of a step of 1 px between neighbours")
+    p2: int = Field(288, ge=1, description="penalty of a larger step; above p1")
     uniqueness: int = Field(10, ge=0, le=100, description="percent by which the best cost must beat the next")
+    speckle: int = Field(100, ge=0, description="pixels up to which a patch of its own disparity is dropped; 0: none")
     tolerance: int = Field(1, ge=0, description="largest left-right difference that is kept, px")
 
     @field_validator("window")

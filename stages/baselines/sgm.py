@@ -10,6 +10,8 @@ from stages.transforms.gray import to_gray
 _UNITS = 16
 """OpenCV's disparities are whole multiples of 1/16 px, and their number must be a multiple of 16 too."""
 _OFF = -1
+_SPECKLE_RANGE = 2
+"""Largest step within a patch, px."""
 
 
 def match_semi_global(
@@ -21,9 +23,9 @@ def match_semi_global(
         left: (y, x) uint8.
         right: (y, x) uint8.
         params: range, block and penalties.
-        checked: drop what fails the left-right check or is not unique, as OpenCV does it: nothing is said in a band at
-            the border whose search would leave the right image. Without, the views are continued by their edge, and
-            every pixel is answered.
+        checked: drop what fails the left-right check, is not unique or is a speckle, as OpenCV does it: nothing is
+            said in a band at the border whose search would leave the right image. Without, the views are continued
+            by their edge, and every pixel is answered.
 
     Returns:
         (y, x) float32, px, in steps of 1/16; NaN where nothing is reported.
@@ -41,6 +43,8 @@ def match_semi_global(
         P2=params.p2,
         disp12MaxDiff=params.tolerance if checked else _OFF,
         uniquenessRatio=params.uniqueness if checked else 0,
+        speckleWindowSize=params.speckle if checked else 0,
+        speckleRange=_SPECKLE_RANGE,
         mode=cv2.STEREO_SGBM_MODE_HH,
     )
     found = matcher.compute(left, right)[:, margin : left.shape[1] - margin].astype(np.float32) / _UNITS
