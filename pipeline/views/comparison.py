@@ -71,8 +71,9 @@ def density_figure(means: Sequence[Row]) -> Figure:
     for row, marker, colour in zip(others, cycle(_MARKERS), cycle(LINES[1:]), strict=False):
         axes.plot(row["invalid"], row["bad"], marker, color=colour, markersize=9, label=row["method"])
     mask, threshold, scenes = means[0]["mask"], means[0]["threshold_px"], means[0]["scene"]
-    axes.set_xlabel(f"invalid: {mask} pixels without a disparity (%), {scenes}")
+    axes.set_xlabel(f"invalid: {mask} pixels without a disparity (%), {scenes} scenes")
     axes.set_ylabel(f"bad: reported {mask} pixels off by more than {threshold:g} px (%)")
+    axes.margins(x=0.12)
     axes.set_ylim(bottom=0)
     axes.set_xlim(left=0)
     axes.grid(alpha=0.3)
