@@ -164,10 +164,10 @@ def run(
         StageFailed: a fault of a stage, with its cause.
     """
     task = Task(task) if isinstance(task, str) else task
-    return _run(task, task.request(upto), forced, watch, scheduler, workers)
+    return carry_out(task, task.request(upto), forced, watch, scheduler, workers)
 
 
-def _run(
+def carry_out(
     task: Task,
     request: Request,
     forced: Sequence[str],
@@ -175,6 +175,7 @@ def _run(
     scheduler: str | None,
     workers: int | None,
 ) -> Result:
+    """Make what a request asks for; see ``run``."""
     store = open_store(task.cache)
     extras = provenance(sys.argv, next(iter(request.configs.values())).model_dump(mode="json"))
 
@@ -238,7 +239,7 @@ def sweep(
         for combination in itertools.product(*(_alternatives(setting) for setting in settings))
         for threshold in thresholds
     ]
-    return _run(task, task.request("metrics", variants), (), watch, scheduler, workers)
+    return carry_out(task, task.request("metrics", variants), (), watch, scheduler, workers)
 
 
 def _alternatives(setting: str) -> list[str]:

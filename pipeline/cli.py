@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipeline import cli_match, cli_view
+from pipeline import cli_compare, cli_match, cli_view
 from pipeline.cli_cache import cache_app
 from pipeline.cli_options import (
     CacheOption,
@@ -42,6 +42,7 @@ data_app = typer.Typer(help="Look at datasets.", no_args_is_help=True)
 app.add_typer(cache_app, name="cache")
 app.add_typer(data_app, name="data")
 cli_match.register(app)
+cli_compare.register(app)
 
 
 @app.command()

@@ -13,6 +13,14 @@ from typing import Any, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.errors import UsageError
+from stages.baselines.declaration import (
+    CcnnParams,
+    CheckedParams,
+    CostConfidenceParams,
+    ForestParams,
+    SgmParams,
+    WindowParams,
+)
 from stages.disparity_declaration import DisparityParams
 from stages.evaluation.declaration import ConfidenceParams, EvaluationNetParams, EvaluationSamplesParams
 from stages.filtering import SemidenseParams
@@ -46,6 +54,13 @@ class Config(BaseModel):
     confidence: ConfidenceParams = ConfidenceParams()
     semidense: SemidenseParams = SemidenseParams()
     refined: RefinedParams = RefinedParams()
+    sgm: SgmParams = SgmParams()
+    census: WindowParams = WindowParams()
+    sncc: WindowParams = WindowParams()
+    mc_cnn: CheckedParams = CheckedParams()
+    cost_confidence: CostConfidenceParams = CostConfidenceParams()
+    o1_forest: ForestParams = ForestParams()
+    ccnn_net: CcnnParams = CcnnParams()
 
     def section(self, product: str) -> Params:
         """Return the settings of a product; those of a product without any are empty."""

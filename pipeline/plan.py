@@ -14,7 +14,7 @@ from cache import ABSENT, Change, Entry, Recipe, Store, differences
 from pipeline.config import nearest
 from pipeline.errors import UsageError
 from pipeline.reasons import PENDING, Causes
-from pipeline.steps import PRODUCTS, Graph, Request, Step, build
+from pipeline.steps import ALL_PRODUCTS, Graph, Request, Step, build
 
 State = Literal["hit", "made", "stale", "missing"]
 
@@ -78,9 +78,9 @@ def make_plan(request: Request, store: Store, forced: Iterable[str] = ()) -> Pla
         UsageError, DatasetError, StageError: if the request cannot be carried out.
         CacheUnavailable: if the cache cannot be read.
     """
-    unknown = sorted(set(forced) - set(PRODUCTS))
+    unknown = sorted(set(forced) - set(ALL_PRODUCTS))
     if unknown:
-        raise UsageError(f"no product {unknown[0]!r} to force; {nearest(unknown[0], PRODUCTS)}")
+        raise UsageError(f"no product {unknown[0]!r} to force; {nearest(unknown[0], ALL_PRODUCTS)}")
     return plan_graph(build(request), store, forced)
 
 

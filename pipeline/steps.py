@@ -8,22 +8,24 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from typing import Any
 
 from cache import Recipe, code_parts
 from datasets import Dataset, SceneSource
 from pipeline import shipped, sources
 from pipeline.config import Config, nearest
+from pipeline.environment import environment
 from pipeline.errors import UsageError
 from pipeline.resolution import resolved
-from stages.catalog import STAGES
+from stages.catalog import CATALOG, STAGES
 from stages.stage import Params, Stage
 
 PACKAGES = ("pipeline", "stages", "datasets", "cache")
 NETS = ("matching_net", "evaluation_net")
-PRODUCTS = ("images", "truth", *STAGES)
-"""Every product, in order; the names that ``--upto`` takes."""
+PRODUCTS = ("images", "truth", *(stage.product for stage in CATALOG))
+"""The products of the dataflow, in order."""
+ALL_PRODUCTS = ("images", "truth", *STAGES)
+"""They and the baselines, in order; the names that ``--upto`` takes."""
 SPLIT = "training split"
 """Stands for a scene in steps that belong to all training scenes together."""
 
@@ -114,8 +116,9 @@ class Request:
         configs: one configuration, or several of a sweep, by the name of the variant (empty for a single one).
         upto: the product to stop at.
         train: train the networks instead of taking the shipped weights.
-        training: the scenes to train on; needed with ``train``.
+        training: the scenes to train on; needed with ``train``, and for products that are always learnt.
         notes: what a person should know of it.
+        also: further products of each scene that has a truth, beside ``upto``.
     """
 
     dataset: Dataset
@@ -124,11 +127,12 @@ class Request:
     train: bool = False
     training: tuple[SceneSource, ...] = ()
     notes: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a product that does not exist."""
-        if self.upto not in PRODUCTS:
-            raise UsageError(f"no product {self.upto!r}; {nearest(self.upto, PRODUCTS)}")
+        if self.upto not in ALL_PRODUCTS:
+            raise UsageError(f"no product {self.upto!r}; {nearest(self.upto, ALL_PRODUCTS)}")
 
 
 def build(request: Request) -> Graph:
@@ -144,7 +148,7 @@ def build(request: Request) -> Graph:
         builder = _Builder(graph, config, request)
         graph.targets += [(step_id, variant) for step_id in _targets(builder, trained_on)]
     # The order of the products is one in which each comes after its inputs, whichever scenes they belong to.
-    in_order = sorted(graph.steps.items(), key=lambda item: PRODUCTS.index(item[1].product))
+    in_order = sorted(graph.steps.items(), key=lambda item: ALL_PRODUCTS.index(item[1].product))
     graph.steps = dict(in_order)
     graph.notes = list(dict.fromkeys(graph.notes))
     if not graph.targets:
@@ -165,12 +169,13 @@ def _targets(builder: "_Builder", trained_on: set[str]) -> Iterator[str]:
             notes.append(f"{scene.name} has no ground truth: there are no metrics for it")
             yield builder.product("images" if upto == "truth" else _known(scene, "semidense", notes), scene)
         else:
-            yield builder.product(_known(scene, upto, notes), scene)
+            for product in (upto, *builder.request.also):
+                yield builder.product(_known(scene, product, notes), scene)
 
 
 def needs_range(product: str) -> bool:
     """Return whether a product of a scene is made from costs, for which its range of disparities must be known."""
-    return product != "truth" and PRODUCTS.index(product) >= PRODUCTS.index("costvolume")
+    return product != "truth" and ALL_PRODUCTS.index(product) >= ALL_PRODUCTS.index("costvolume")
 
 
 def _known(scene: SceneSource, product: str, notes: list[str]) -> str:
@@ -253,7 +258,7 @@ class _Builder:
                 inputs=dict(inputs),
                 size=size,
                 code=dict(code),
-                environment=_environment(),
+                environment=environment(stage),
                 R=threshold,
             )
         return step_id
@@ -264,11 +269,6 @@ def _tiles(stage: Stage, params: Params) -> str:
     if stage.tile_rows is None:
         return "whole"
     return f"{stage.tile_rows} rows, halo {stage.halo(params)}, {stage.border}"
-
-
-def _environment() -> dict[str, str]:
-    """Return what changes bits besides code and settings: major versions, and the format of the arrays."""
-    return {"torch": version("torch").split(".")[0], "numpy": version("numpy").split(".")[0], "zarr_format": "3"}
 
 
 def training_scenes(dataset: Dataset) -> tuple[SceneSource, ...]:

@@ -4,6 +4,7 @@ The declarations stand beside what can be set for them; the functions that they 
 when something is computed.
 """
 
+from stages.baselines.declaration import BASELINES
 from stages.disparity_declaration import DISPARITY
 from stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
 from stages.filtering import SEMIDENSE
@@ -32,5 +33,5 @@ CATALOG: tuple[Stage, ...] = (
 )
 """The stages, in the order of the dataflow."""
 
-STAGES = {stage.product: stage for stage in CATALOG}
-"""The stages by the name of their product."""
+STAGES = {stage.product: stage for stage in (*CATALOG, *BASELINES)}
+"""The stages by the name of their product; after those of the dataflow what they are compared with."""

@@ -107,6 +107,7 @@ class Stage:
         sizes: of a tiled stage, the length of each dimension other than ``y`` and ``x``, from the
             parameters: its arrays exist before its first tile.
         monitored: long work, which reports progress and can resume.
+        needs: distributions beside the core ones; their versions enter the key.
     """
 
     product: str
@@ -120,6 +121,7 @@ class Stage:
     border: Border = "cut"
     sizes: Callable[[Any], Mapping[str, int]] = lambda _: {}
     monitored: bool = False
+    needs: tuple[str, ...] = ()
 
     @property
     def module(self) -> str:

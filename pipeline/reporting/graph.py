@@ -6,7 +6,7 @@ from typing import NamedTuple
 from pipeline.cachetools import bytes_text
 from pipeline.markup import Html, table, tag, text
 from pipeline.reporting.gathered import Gathered
-from pipeline.steps import PRODUCTS
+from pipeline.steps import ALL_PRODUCTS
 from stages.catalog import STAGES
 
 _PLACES = {
@@ -49,7 +49,7 @@ def done(found: Gathered) -> dict[str, Done]:
         entry = found.entries.get(planned.key or "") if planned.state == "hit" else None
         made = (entry.seconds, entry.size) if entry else (0.0, 0)
         counts[planned.step.product] = Done(cached + bool(entry), wanted + 1, seconds + made[0], size + made[1])
-    return {product: counts[product] for product in PRODUCTS if product in counts}
+    return {product: counts[product] for product in ALL_PRODUCTS if product in counts}
 
 
 def steps_table(found: Gathered) -> Html:

@@ -5,13 +5,13 @@ import json
 from cache import Entry, Store
 from pipeline.cachetools import bytes_text
 from pipeline.markup import Html, folded, table, tag, text
-from pipeline.steps import PRODUCTS
+from pipeline.steps import ALL_PRODUCTS
 from pipeline.viewer.catalogue import Configuration
 
 
 def provenance_table(chosen: Configuration, store: Store) -> Html:
     """Return each product of a configuration, with everything that its record tells folded below it."""
-    products = sorted(chosen.entries.items(), key=lambda item: PRODUCTS.index(item[0]))
+    products = sorted(chosen.entries.items(), key=lambda item: ALL_PRODUCTS.index(item[0]))
     rows = [
         [
             product,

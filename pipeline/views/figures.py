@@ -49,8 +49,11 @@ _DRAW: Mapping[str, Callable[..., None]] = {
     "refined": draw_disparity,
     "filled": draw_disparity,
     "metrics": draw_metrics,
+    **dict.fromkeys(("sgm", "census", "sncc", "mc_cnn"), draw_disparity),
+    **dict.fromkeys(("o1", "ccnn"), draw_confidence),
+    "ccnn_net": draw_network,
 }
-"""What draws each product."""
+"""What draws each product that has a figure."""
 _TOLD = {
     "channels": ("rank_window", "companion_window", "companion_rays"),
     "matching_samples": ("form", "samples"),

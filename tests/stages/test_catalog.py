@@ -4,21 +4,23 @@ import sys
 
 import pytest
 
+from stages.baselines.declaration import BASELINES
 from stages.catalog import CATALOG, STAGES
 from stages.stage import Stage
 
 READ = {"images", "truth"}
 """Products that no stage makes."""
-stages = pytest.mark.parametrize("stage", CATALOG, ids=lambda stage: stage.product)
+ALL = (*CATALOG, *BASELINES)
+stages = pytest.mark.parametrize("stage", ALL, ids=lambda stage: stage.product)
 
 
 def test_every_product_comes_after_what_it_is_made_from() -> None:
     known = set(READ)
-    for stage in CATALOG:
+    for stage in ALL:
         assert set(stage.inputs) <= known, stage.product
         assert stage.product not in known, "no product twice"
         known.add(stage.product)
-    assert list(STAGES) == [stage.product for stage in CATALOG]
+    assert list(STAGES) == [stage.product for stage in ALL]
 
 
 @stages

@@ -1,0 +1,62 @@
+"""The command ``compare``. Nothing heavy is imported before it runs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipeline.cli_options import (
+    CacheOption,
+    ConfigOption,
+    JsonOption,
+    SceneOption,
+    SchedulerOption,
+    SetOption,
+    WorkersOption,
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command()(compare)
+
+
+def compare(
+    dataset: Annotated[str, typer.Argument(help="Scenes with a ground truth, such as middlebury:DIR.")] = "motorcycle",
+    scene: SceneOption = None,
+    experiment: Annotated[
+        list[str] | None, typer.Option("--experiment", help="raw, density or auc; may be repeated [default: all].")
+    ] = None,
+    train_on: Annotated[
+        str | None,
+        typer.Option(
+            "--train-on", help="Train on this dataset what must be trained: O1, CCNN, networks of fewer channels."
+        ),
+    ] = None,
+    settings: SetOption = None,
+    config: ConfigOption = None,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Where comparison.csv, comparison.json and the figures go.")
+    ] = Path("comparison"),
+    scheduler: SchedulerOption = None,
+    workers: WorkersOption = None,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Set baselines beside the two networks: the paper's tables and figures."""
+    from pipeline import api, comparison, comparison_report, console
+    from pipeline.progress import ProgressWatch
+
+    task = api.Task(dataset, tuple(scene or ()), tuple(settings or ()), config, False, cache)
+    experiments = experiment or comparison.EXPERIMENTS
+    with ProgressWatch() as watch:
+        found = comparison.compare(task, experiments, train_on, watch=watch, scheduler=scheduler, workers=workers)
+    files = comparison_report.write_comparison(found, output)
+    if as_json:
+        console.print_json(comparison_report.as_json(found, files))
+        return
+    comparison_report.print_comparison(found, api.mask_kinds(found.result).values())
+    console.print_notes(found.notes)
+    for file in files:
+        typer.echo(f"wrote {file}")
+    typer.echo(console.reuse_line(found.result.made.values()))

@@ -1,0 +1,246 @@
+"""The paper's experiments side by side: raw maps, error at equal density, confidence measures.
+
+Baselines are products like all others: each is computed once and then read from the cache. Those whose
+packages or training scenes are not there are left out, and say why.
+"""
+
+import dataclasses
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datasets import Dataset, SceneSource, open_dataset
+from pipeline.api import Result, Task, carry_out
+from pipeline.comparison_rows import (
+    OURS,
+    Judged,
+    Row,
+    auc_rows,
+    curve_rows,
+    density_rows,
+    equal_density,
+    mean_rows,
+    raw_rows,
+)
+from pipeline.config import Config, nearest
+from pipeline.environment import missing_packages
+from pipeline.errors import UsageError
+from pipeline.quoted import NAMED
+from pipeline.steps import Request, training_scenes
+from pipeline.tasks import Made, Watch, read_arrays
+from stages.catalog import STAGES
+from stages.stage import Arrays
+
+EXPERIMENTS = ("raw", "density", "auc")
+"""What is compared: dense maps, semi-dense maps, and confidence measures."""
+MATCHERS = {"SGM (OpenCV SGBM)": "sgm", "SNCC": "sncc", "census": "census", "MC-CNN fast": "mc_cnn"}
+"""Other matchers, by name: their products have a ``dense`` map, and a ``disparity`` after their own checks."""
+MEASURES = {
+    "evaluation-Net": ("confidence", "confidence"),
+    "APKR": ("cost_confidence", "apkr"),
+    "O1": ("o1", "confidence"),
+    "CCNN": ("ccnn", "confidence"),
+    "left-right difference": ("cost_confidence", "lrd"),
+    "PKRN": ("cost_confidence", "pkrn"),
+    "cost": ("cost_confidence", "msm"),
+}
+"""Confidence measures of the raw map, by name: product and array."""
+LEARNT = ("o1", "ccnn")
+"""Products that need training scenes; ``--train-on`` names them."""
+ABLATION = {
+    "gray + rank + companion, trained alike": ("gray", "rank", "companion"),
+    "gray + rank, trained alike": ("gray", "rank"),
+    "gray + companion, trained alike": ("gray", "companion"),
+    "gray only, trained alike": ("gray",),
+}
+"""matching-Nets that see different channels; the last is what MC-CNN sees."""
+_ALWAYS = ("images", "truth", "disparity", "confidence")
+_UNTRAINED = "needs a training set: name one with --train-on"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What a comparison found.
+
+    Attributes:
+        rows: a row an experiment, scene, method, mask, threshold and, on a curve, R; see ``comparison_rows.FIGURES``.
+        unavailable: ``method`` and ``why`` of what was not run.
+        notes: what a person should know.
+        result: of the run behind it, with every product.
+    """
+
+    rows: list[Row]
+    unavailable: list[dict[str, str]]
+    notes: tuple[str, ...]
+    result: Result
+
+    @property
+    def means(self) -> list[Row]:
+        """The rows' means over the scenes."""
+        return mean_rows(self.rows)
+
+    @property
+    def scenes(self) -> list[str]:
+        """The names of the scenes, in order."""
+        return list(dict.fromkeys(row["scene"] for row in self.rows))
+
+    def arrays(self, scene: str) -> dict[str, Arrays]:
+        """Return the arrays of every product of a scene that was asked for, in memory."""
+        return _read(self.result, _asked(self.result)[scene])
+
+    def images(self, scene: str) -> Arrays:
+        """Return the views of a scene."""
+        return read_arrays(self.result.store, _asked(self.result)[scene]["images"].key)
+
+
+def compare(
+    task: Task | str = "motorcycle",
+    experiments: Sequence[str] = EXPERIMENTS,
+    train_on: str | None = None,
+    *,
+    watch: Watch | None = None,
+    scheduler: str | None = None,
+    workers: int | None = None,
+) -> Comparison:
+    """Run the paper's experiments on the scenes of a dataset that have a ground truth.
+
+    Args:
+        task: what to work on; a text is a dataset. The two networks have their shipped weights.
+        experiments: of ``EXPERIMENTS``.
+        train_on: dataset whose training scenes O1 and CCNN learn from, and on which matching-Nets with different
+            channels are trained from nothing, alike; without it, those rows are left out.
+        watch: as for ``run``.
+        scheduler: as for ``run``.
+        workers: as for ``run``.
+
+    Raises:
+        UsageError, DatasetError, CacheError, StageError: what the user can mend, in one line.
+    """
+    task = Task(task) if isinstance(task, str) else task
+    _require(task, experiments)
+    training = training_scenes(open_dataset(train_on)) if train_on else ()
+    plain = task.request("semidense")
+    dataset, notes = _with_truth(plain.dataset)
+    products, unavailable = _available(experiments, bool(training))
+    request = dataclasses.replace(plain, dataset=dataset, training=training, also=(*_ALWAYS, *products))
+    result = carry_out(task, request, (), watch, scheduler, workers)
+    rows = list(_rows(result, experiments))
+    if "raw" in experiments and training:
+        ablation = _ablation_request(task, dataset, training)
+        rows += _ablation_rows(carry_out(task, ablation, (), watch, scheduler, workers))
+    return Comparison(rows, unavailable, (*notes, *result.plan.notes), result)
+
+
+def _require(task: Task, experiments: Sequence[str]) -> None:
+    for name in experiments:
+        if name not in EXPERIMENTS:
+            raise UsageError(f"no experiment {name!r}; {nearest(name, EXPERIMENTS)}")
+    if not experiments:
+        raise UsageError(f"no experiment was named; there are {', '.join(EXPERIMENTS)}")
+    if task.train:
+        raise UsageError("a comparison takes the shipped networks; what is trained beside them is named by train_on")
+
+
+def _with_truth(dataset: Dataset) -> tuple[Dataset, list[str]]:
+    """Return the dataset without the scenes that nothing can be compared on, and a note for each."""
+    known = tuple(scene for scene in dataset.scenes if scene.has_truth)
+    if not known:
+        raise UsageError(f"{dataset.spec}: no scene has a ground truth, so there is nothing to compare with")
+    notes = [f"{scene.name} has no ground truth: it is left out" for scene in dataset.scenes if not scene.has_truth]
+    return dataclasses.replace(dataset, scenes=known), notes
+
+
+def _available(experiments: Sequence[str], trained: bool) -> tuple[tuple[str, ...], list[dict[str, str]]]:
+    """Return the products that the experiments need and that can be made, and why others cannot."""
+    wanted = {method: product for method, product in MATCHERS.items() if {"raw", "density"} & set(experiments)}
+    if "auc" in experiments:
+        wanted |= {method: product for method, (product, _) in MEASURES.items() if product not in _ALWAYS}
+    reasons = {product: _reason(product, trained) for product in wanted.values()}
+    products = tuple(product for product, reason in reasons.items() if not reason)
+    missing = {method: reasons[product] for method, product in wanted.items() if reasons[product]}
+    if "raw" in experiments:
+        missing |= {} if trained else dict.fromkeys(ABLATION, _UNTRAINED)
+        missing["MC-CNN accurate"] = "mccnn 1.4 runs the fast network only"
+    if "density" in experiments:
+        missing |= dict.fromkeys(NAMED, "in the paper's plot only: its text gives no figure for error against invalid")
+    return products, [{"method": method, "why": why} for method, why in missing.items()]
+
+
+def _reason(product: str, trained: bool) -> str:
+    """Return why a product cannot be made; nothing if it can."""
+    inputs = (STAGES[name] for name in STAGES[product].inputs if name in STAGES)
+    packages = [name for stage in (STAGES[product], *inputs) for name in missing_packages(stage)]
+    if packages:
+        return f"needs {' and '.join(packages)}: pip install 'semidense-stereo[baselines]'"
+    return _UNTRAINED if product in LEARNT and not trained else ""
+
+
+def _asked(result: Result) -> dict[str, dict[str, Made]]:
+    """Return what a run was asked for: scene -> product -> result."""
+    found: dict[str, dict[str, Made]] = {}
+    for step_id, _ in result.plan.targets:
+        made = result.made[step_id]
+        found.setdefault(made.step.scene, {})[made.step.product] = made
+    return found
+
+
+def _read(result: Result, products: Mapping[str, Made]) -> dict[str, Arrays]:
+    return {product: read_arrays(result.store, made.key) for product, made in products.items()}
+
+
+def _rows(result: Result, experiments: Sequence[str]) -> Iterator[Row]:
+    for scene, made in _asked(result).items():
+        products = _read(result, made)
+        judged = Judged(scene, products["truth"])
+        for experiment in experiments:
+            yield from _EXPERIMENT[experiment](judged, products, made["semidense"].step.R)
+
+
+def _raw(judged: Judged, products: Mapping[str, Arrays], _: float | None) -> Iterator[Row]:
+    yield from raw_rows(judged, f"{OURS}, shipped weights", products["disparity"]["disparity"])
+    for method, product in MATCHERS.items():
+        if product in products:
+            yield from raw_rows(judged, method, products[product]["dense"])
+
+
+def _density(judged: Judged, products: Mapping[str, Arrays], R: float | None) -> Iterator[Row]:
+    ours: dict[str, NDArray[np.float32]] = {name: products[name][name] for name in ("disparity", "confidence")}
+    yield from (row | {"R": R} for row in density_rows(judged, OURS, products["semidense"]["disparity"]))
+    for method, product in MATCHERS.items():
+        if product in products:
+            rows = density_rows(judged, method, products[product]["disparity"])
+            yield from equal_density(rows, judged, ours)
+    yield from curve_rows(judged, ours)
+
+
+def _auc(judged: Judged, products: Mapping[str, Arrays], _: float | None) -> Iterator[Row]:
+    for method, (product, array) in MEASURES.items():
+        if product in products:
+            yield from auc_rows(judged, method, products[product][array], products["disparity"]["disparity"])
+
+
+_EXPERIMENT = {"raw": _raw, "density": _density, "auc": _auc}
+
+
+def _ablation_request(task: Task, dataset: Dataset, training: tuple[SceneSource, ...]) -> Request:
+    """Return the request for raw maps of matching-Nets that are trained alike, on different channels."""
+    configs = {
+        method: Config.load(task.config, [*task.settings, f"channels.use={_as_list(channels)}"])
+        for method, channels in ABLATION.items()
+    }
+    return Request(dataset, configs, "disparity", train=True, training=training, also=("truth",))
+
+
+def _as_list(channels: Iterable[str]) -> str:
+    return "[" + ", ".join(f'"{channel}"' for channel in channels) + "]"
+
+
+def _ablation_rows(result: Result) -> Iterator[Row]:
+    targets = [(result.made[step_id], variant) for step_id, variant in result.plan.targets]
+    truths = {made.step.scene: made.key for made, _ in targets if made.step.product == "truth"}
+    for made, variant in targets:
+        if made.step.product == "disparity":
+            judged = Judged(made.step.scene, read_arrays(result.store, truths[made.step.scene]))
+            yield from raw_rows(judged, variant, read_arrays(result.store, made.key)["disparity"])

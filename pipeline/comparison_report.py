@@ -1,0 +1,175 @@
+"""What a comparison leaves: tables, ``comparison.csv``, ``comparison.json``, and figures."""
+
+import csv
+import io
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from datasets.formats.atomic import atomic_write
+from pipeline.comparison import Comparison
+from pipeline.comparison_rows import FIGURES, Row
+from pipeline.console import results
+from pipeline.exporter import writable_folder
+from pipeline.quoted import QUOTED
+from pipeline.views.comparison import density_figure, dots_figure
+from pipeline.views.png import explaining, save_png
+from pipeline.views.sheets import sheets
+
+MASK, THRESHOLD = "nonocc", 1.0
+"""Mask, and threshold in px of the image at hand, of tables and figures; the files have all."""
+COLUMNS = ("experiment", "scene", "method", "mask", "threshold_px", "R", "pixels", *FIGURES, "quoted", "data")
+"""The columns of ``comparison.csv``."""
+_TITLES = {
+    "raw": "Raw maps: wrong or unreported pixels, %",
+    "auc": "Confidence of the raw map: area under the error curve; lower is better",
+}
+_DENSITY = ("invalid", "bad", "bad_dual_cnn", "avgerr", "rms", "A50", "A90", "A95", "A99")
+_SHORT = {"invalid": "invalid %", "bad": "bad %", "bad_dual_cnn": "bad % of dual-cnn there", "auc": "AUC"}
+
+
+def as_json(found: Comparison, files: Iterable[Path] = ()) -> dict[str, Any]:
+    """Return a comparison as one object for scripts.
+
+    Returns:
+        ``rows`` and ``means`` in the form of metrics rows with their ``experiment``; ``quoted``: the paper's figures,
+        each with its ``data``; ``unavailable``: ``method`` and ``why``; ``notes``; ``files``.
+    """
+    return {
+        "rows": found.rows,
+        "means": found.means,
+        "quoted": _quoted(found),
+        "unavailable": found.unavailable,
+        "notes": list(found.notes),
+        "files": [str(file) for file in files],
+    }
+
+
+def _quoted(found: Comparison) -> list[Row]:
+    """Return the paper's figures for the experiments that were run."""
+    run = {row["experiment"] for row in found.rows}
+    return [row for row in QUOTED if row["experiment"] in run]
+
+
+def write_comparison(found: Comparison, folder: Path) -> list[Path]:
+    """Write ``comparison.csv``, ``comparison.json`` and the figures; return their paths.
+
+    Raises:
+        UsageError: if the folder cannot be written.
+    """
+    writable_folder(folder)
+    written = [folder / "comparison.csv", folder / "comparison.json"]
+    for name, drawn in _figures(found).items():
+        save_png(drawn, folder / name)
+        written.append(folder / name)
+    _write(written[0], _csv([*found.rows, *found.means, *_quoted(found)]))
+    _write(written[1], json.dumps(as_json(found, written), allow_nan=False, indent=1))
+    return written
+
+
+def _write(path: Path, text: str) -> None:
+    with explaining(path), atomic_write(path) as file:
+        file.write(text.encode())
+
+
+def _csv(rows: Sequence[Row]) -> str:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, COLUMNS, extrasaction="raise", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _figures(found: Comparison) -> dict[str, Any]:
+    """Return the figures by file name: a figure an experiment that was run, and the sheets."""
+    rows = _at(found.rows)
+    figures = {
+        f"{experiment}.png": dots_figure(of(rows, experiment), figure, title=_TITLES[experiment])
+        for experiment, figure in (("raw", "raw_bad"), ("auc", "auc"))
+        if of(rows, experiment)
+    }
+    if of(rows, "density"):
+        figures["density.png"] = density_figure(_at(found.means))
+    return figures | sheets(found)
+
+
+def _at(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows at the mask and threshold of tables and figures."""
+    return [row for row in rows if row["mask"] == MASK and row["threshold_px"] == THRESHOLD]
+
+
+def of(rows: Iterable[Row], experiment: str) -> list[Row]:
+    """Return the rows of an experiment."""
+    return [row for row in rows if row["experiment"] == experiment]
+
+
+def print_comparison(found: Comparison, masks: Iterable[str]) -> None:
+    """Print a table an experiment, the paper's figures beside, and why something is missing.
+
+    Args:
+        found: the comparison.
+        masks: where the non-occlusion masks of the scenes come from.
+    """
+    console = results()
+    rows, means = _at(found.rows), _at(found.means)
+    for experiment, figure in (("raw", "raw_bad"), ("auc", "auc")):
+        if of(rows, experiment):
+            console.print(_by_scene(of(rows, experiment), of(means, experiment), experiment, figure))
+    if of(rows, "density"):
+        console.print(_density_table(of(means, "density")))
+    _print_quoted(console, _quoted(found))
+    kinds = ", ".join(sorted(set(masks)))
+    text = f"mask: {MASK} ({kinds}); wrong: off by more than {THRESHOLD:g} px of the image at hand"
+    console.print(text, style="dim", highlight=False)
+    for reason in dict.fromkeys(each["why"] for each in found.unavailable):
+        methods = ", ".join(each["method"] for each in found.unavailable if each["why"] == reason)
+        console.print(f"not run: {methods}: {reason}", style="dim", highlight=False, markup=False)
+
+
+def _by_scene(rows: Sequence[Row], means: Sequence[Row], experiment: str, figure: str) -> Table:
+    """Return a table with a row a method and a column a scene."""
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    table = _table(_TITLES[experiment], "method", *scenes, "mean")
+    cells = {(row["method"], row["scene"]): row for row in rows}
+    methods = [(row["method"], figure, row) for row in means]
+    if experiment == "auc":
+        methods.append(("optimal", "auc_optimal", means[0]))
+    for method, shown, mean in methods:
+        of_scenes = [cells.get((mean["method"], scene), {}) for scene in scenes]
+        table.add_row(escape(method), *(_cell(row, shown) for row in [*of_scenes, mean]))
+    return table
+
+
+def _density_table(means: Sequence[Row]) -> Table:
+    """Return a table of what semi-dense maps report: means over the scenes."""
+    title = f"Semi-dense maps, {means[0]['scene']} scenes; errors of reported pixels, px"
+    table = _table(title, "method", "R", *(_SHORT.get(name, name) for name in _DENSITY))
+    for row in means:
+        threshold = f"{row['R']:g}" if "R" in row else "-"
+        table.add_row(escape(row["method"]), threshold, *(_cell(row, name) for name in _DENSITY))
+    return table
+
+
+def _print_quoted(console: Console, quoted: Sequence[Row]) -> None:
+    table = _table("Quoted from the paper: other data, another resolution", "method", "figure", "value", "on")
+    for row in quoted:
+        (figure,) = (name for name in FIGURES if name in row)
+        table.add_row(row["method"], _SHORT.get(figure, figure), _cell(row, figure), row["data"])
+    console.print(table)
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(*(escape(column) for column in columns), title=title, title_justify="left", box=None, pad_edge=False)
+    for column in table.columns[1:]:
+        column.justify = "right"
+    return table
+
+
+def _cell(row: Row, figure: str) -> str:
+    digits = 4 if figure.startswith("auc") else 2
+    return f"{row[figure]:.{digits}f}" if figure in row else "-"

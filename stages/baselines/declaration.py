@@ -1,0 +1,237 @@
+"""What the baselines are made from, and what can be set. Light: it loads none of the packages that they need."""
+
+from pydantic import Field, field_validator, model_validator
+
+from stages.schedule import SHARDS, Schedule
+from stages.stage import Output, Params, Stage, StageError
+
+_DENSE = Output("dense", ("y", "x"), "float32", "px", "disparity of every pixel, before anything is filtered")
+_CHECKED = Output("disparity", ("y", "x"), "float32", "px", "disparity after the matcher's own checks; NaN: dropped")
+
+
+class RangeParams(Params):
+    """The disparities that are looked through."""
+
+    d_min: int | None = Field(None, description="smallest disparity, px; default: the scene's own")
+    d_max: int | None = Field(None, description="largest disparity, px; default: the scene's own")
+
+    @property
+    def disparities(self) -> range:
+        """The disparities, once both ends are known.
+
+        Raises:
+            StageError: if one is not.
+        """
+        if self.d_min is None or self.d_max is None:
+            raise StageError("a matcher needs a disparity range: give d_min and d_max")
+        return range(self.d_min, self.d_max + 1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "RangeParams":
+        if self.d_min is not None and self.d_max is not None and self.d_max < self.d_min:
+            raise ValueError(f"d_max {self.d_max} lies below d_min {self.d_min}")
+        return self
+
+
+class CheckedParams(RangeParams):
+    """A matcher whose two views are compared."""
+
+    tolerance: float = Field(1.0, ge=0, description="largest left-right difference that is kept, px")
+
+
+class WindowParams(CheckedParams):
+    """A matcher that sums what single pixels say over a window."""
+
+    window: int = Field(9, ge=1, le=99, description="side of the square over which costs are averaged, px, odd")
+
+    @field_validator("window")
+    @classmethod
+    def _odd(cls, window: int) -> int:
+        return require_odd(window)
+
+
+class SgmParams(RangeParams):
+    """OpenCV's semi-global block matching."""
+
+    window: int = Field(3, ge=1, le=11, description="side of the matched block, px, odd")
+    p1: int = Field(72, ge=0, description="penalty of a step of 1 px between neighbours")
+    p2: int = Field(288, ge=1, description="penalty of a larger step; above p1")
+    uniqueness: int = Field(10, ge=0, le=100, description="percent by which the best cost must beat the next")
+    speckle: int = Field(100, ge=0, description="pixels up to which a patch of its own disparity is dropped; 0: none")
+    tolerance: int = Field(1, ge=0, description="largest left-right difference that is kept, px")
+
+    @field_validator("window")
+    @classmethod
+    def _odd(cls, window: int) -> int:
+        return require_odd(window)
+
+    @model_validator(mode="after")
+    def _rising(self) -> "SgmParams":
+        if self.p2 <= self.p1:
+            raise ValueError(f"p2 {self.p2} must be above p1 {self.p1}")
+        return self
+
+
+class CostConfidenceParams(Params):
+    """Confidence read off the cost volume."""
+
+    window: int = Field(5, ge=1, le=99, description="side of the square over which APKR averages, px, odd")
+
+    @field_validator("window")
+    @classmethod
+    def _odd(cls, window: int) -> int:
+        return require_odd(window)
+
+
+def require_odd(window: int) -> int:
+    """Return the side of a window.
+
+    Raises:
+        ValueError: if it is even: such a window has no centre.
+    """
+    if window % 2 == 0:
+        raise ValueError(f"a window of {window} px has no centre: take an odd number")
+    return window
+
+
+CENSUS_WINDOW = (7, 9)
+"""Rows and columns of the census window: 62 neighbours, so that a pixel's signature fits 64 bits."""
+NCC_WINDOW = 3
+"""Side of the inner window of SNCC, as published."""
+
+SGM = Stage(
+    product="sgm",
+    inputs=("images",),
+    outputs=(_DENSE, _CHECKED),
+    compute="stages.baselines.sgm:compute_sgm",
+    params=SgmParams,
+    needs=("opencv-python-headless",),
+)
+"""OpenCV's SGBM with 8 paths. Not tiled: its paths run over the whole image."""
+
+CENSUS = Stage(
+    product="census",
+    inputs=("images",),
+    outputs=(_DENSE, _CHECKED),
+    compute="stages.baselines.census:compute_census",
+    params=WindowParams,
+    tile_rows=64,
+    halo=lambda params: CENSUS_WINDOW[0] // 2 + params.window // 2,
+)
+"""Census transform, Hamming distance, mean over a window, winner takes all."""
+
+SNCC = Stage(
+    product="sncc",
+    inputs=("images",),
+    outputs=(_DENSE, _CHECKED),
+    compute="stages.baselines.sncc:compute_sncc",
+    params=WindowParams,
+    tile_rows=64,
+    halo=lambda params: NCC_WINDOW // 2 + params.window // 2,
+)
+"""Summed normalised cross-correlation, winner takes all."""
+
+COST_CONFIDENCE = Stage(
+    product="cost_confidence",
+    inputs=("costvolume",),
+    outputs=(
+        Output("apkr", ("y", "x"), "float32", "1", "mean ratio of the rival's cost to the least, over a window"),
+        Output("pkrn", ("y", "x"), "float32", "1", "ratio of the second least cost to the least"),
+        Output("lrd", ("y", "x"), "float32", "1", "margin of the least cost over its left-right difference"),
+        Output("msm", ("y", "x"), "float32", "1", "the least cost itself, with the sign turned"),
+    ),
+    compute="stages.baselines.cost_confidence:compute_cost_confidence",
+    params=CostConfidenceParams,
+    tile_rows=32,
+    halo=lambda params: params.window // 2,
+)
+"""Four confidence measures of the raw disparity, from its cost volume alone; higher is surer, NaN: none."""
+
+
+class ForestParams(Params):
+    """The random forest of O1 and what it learns from."""
+
+    samples: int = Field(100_000, ge=2, description="pixels to learn from, over the scenes in equal parts")
+    trees: int = Field(10, ge=1, le=1000, description="trees")
+    depth: int = Field(25, ge=1, le=100, description="deepest level of a tree")
+    tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
+    seed: int = Field(0, ge=0, description="seed of the draw and of the trees")
+
+
+class CcnnParams(Schedule):
+    """The CCNN and how it is trained."""
+
+    first_rate: float = Field(0.001, gt=0, description="learning rate of the first step")
+    crop: int = Field(64, ge=1, le=512, description="side of a training crop, px")
+    batch: int = Field(4, ge=SHARDS, multiple_of=SHARDS, description="crops a step; a multiple of the number of shards")
+    tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
+    seed: int = Field(0, ge=0, description="seed of the weights and the crops")
+
+
+_CONFIDENCE = Output("confidence", ("y", "x"), "float32", "1", "probability that the disparity is right, in [0, 1]")
+O1_SIDES = (5, 7, 9, 11)
+"""Sides of the windows over which O1's features are taken, px."""
+CCNN_RADIUS = 4
+"""Half of CCNN's patch of 9 x 9 px."""
+
+MC_CNN = Stage(
+    product="mc_cnn",
+    inputs=("images",),
+    outputs=(_DENSE, _CHECKED),
+    compute="stages.baselines.mc_cnn:compute_mc_cnn",
+    params=CheckedParams,
+    needs=("mccnn",),
+)
+"""MC-CNN fast with its Middlebury weights, winner takes all. Not tiled: it standardises whole views."""
+
+O1_FOREST = Stage(
+    product="o1_forest",
+    inputs=("disparity", "truth"),
+    outputs=(
+        Output("root", ("tree",), "int32", "1", "first node of each tree"),
+        Output("feature", ("node",), "int32", "1", "which feature is compared; negative at a leaf"),
+        Output("threshold", ("node",), "float64", "1", "up to this a sample goes to the lower child"),
+        Output("lower", ("node",), "int32", "1", "node of the lower child"),
+        Output("upper", ("node",), "int32", "1", "node of the upper child"),
+        Output("right", ("node",), "float32", "1", "share of right disparities among the node's samples"),
+    ),
+    compute="stages.baselines.o1:train_forest",
+    params=ForestParams,
+    scope="split",
+    needs=("scikit-learn",),
+)
+
+O1 = Stage(
+    product="o1",
+    inputs=("disparity", "o1_forest"),
+    outputs=(_CONFIDENCE,),
+    compute="stages.baselines.o1:compute_o1",
+    tile_rows=128,
+    halo=lambda _: O1_SIDES[-1] // 2,
+)
+
+CCNN_NET = Stage(
+    product="ccnn_net",
+    inputs=("disparity", "truth"),
+    outputs=(
+        Output("parameters", ("parameter",), "float32", "1", "weights of the CCNN"),
+        Output("loss", ("step",), "float32", "1", "class-balanced cross-entropy of each training step"),
+    ),
+    compute="stages.baselines.ccnn:train_ccnn",
+    params=CcnnParams,
+    scope="split",
+    monitored=True,
+)
+
+CCNN = Stage(
+    product="ccnn",
+    inputs=("disparity", "ccnn_net"),
+    outputs=(_CONFIDENCE,),
+    compute="stages.baselines.ccnn:compute_ccnn",
+    tile_rows=128,
+    halo=lambda _: CCNN_RADIUS,
+    border="edge",
+)
+
+BASELINES = (SGM, CENSUS, SNCC, MC_CNN, COST_CONFIDENCE, O1_FOREST, O1, CCNN_NET, CCNN)
+"""All of them, in an order in which each comes after what it is made from."""

@@ -1,0 +1,18 @@
+"""Small pairs whose disparity is known."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+SHIFT = 3
+
+
+def shifted_pair(height: int = 40, width: int = 64, shift: int = SHIFT, seed: int = 0) -> dict[str, NDArray[Any]]:
+    """Return the product ``images`` of a plane at one disparity, with a random texture."""
+    texture = np.random.default_rng(seed).integers(0, 256, (height, width + shift, 1), dtype=np.uint8)
+    return {
+        "left": texture[:, :width],
+        "right": texture[:, shift:],
+        "moments": np.zeros((2, 2)),
+    }

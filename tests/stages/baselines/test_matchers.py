@@ -1,0 +1,95 @@
+"""All matchers alike: they find a plane, say nothing where nothing can be said, and keep to their declarations."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stages.baselines.declaration import BASELINES, CENSUS, MC_CNN, SGM, SNCC, SgmParams, WindowParams
+from stages.stage import Stage, StageError
+from tests.stages.baselines.pairs import SHIFT, shifted_pair
+from tests.stages.tiling import same, tiled, whole
+
+MODULES = {"sgm": "cv2", "mc_cnn": "mc_cnn"}
+DIMS = {"images": {"left": ("y", "x", "band"), "right": ("y", "x", "band"), "moments": ("view", "moment")}}
+matchers = pytest.mark.parametrize("stage", (SGM, CENSUS, SNCC, MC_CNN), ids=lambda stage: stage.product)
+window_matchers = pytest.mark.parametrize("stage", (CENSUS, SNCC), ids=lambda stage: stage.product)
+
+
+def matched(stage: Stage, images: dict[str, Any], **settings: object) -> Any:  # noqa: ANN401
+    if stage.product in MODULES:
+        pytest.importorskip(MODULES[stage.product], reason="comes with the extra 'baselines'")
+    return stage.function()(stage.params(d_min=0, d_max=8, **settings), {"images": images})
+
+
+@matchers
+def test_a_textured_plane_is_found_in_every_pixel_that_both_views_show(stage: Stage) -> None:
+    found = matched(stage, shifted_pair())
+    assert set(found) == {"dense", "disparity"}
+    inner = np.s_[8:-8, 16:-8]  # SGBM leaves the left border out
+    for name in found:
+        assert found[name].shape == (40, 64) and found[name].dtype == np.float32
+        np.testing.assert_allclose(found[name][inner], SHIFT, atol=0.3)
+
+
+@window_matchers
+def test_where_the_right_view_ends_no_disparity_leaves_it(stage: Stage) -> None:
+    dense = matched(stage, shifted_pair())["dense"]
+    assert (dense[:, 0] == 0).all(), "only disparity 0 has a right pixel"
+    assert (dense <= np.arange(64)).all()
+
+
+@window_matchers
+def test_a_negative_range_is_searched_too(stage: Stage) -> None:
+    images = shifted_pair()
+    turned = {"left": images["right"], "right": images["left"]}
+    found = stage.function()(WindowParams(d_min=-8, d_max=0), {"images": turned})
+    np.testing.assert_array_equal(found["disparity"][8:-8, 8:-16], -SHIFT)
+
+
+@window_matchers
+def test_a_flat_pair_gives_the_smallest_disparity(stage: Stage) -> None:
+    flat = {view: np.full((20, 24, 1), 90, np.uint8) for view in ("left", "right")}
+    assert (matched(stage, flat)["dense"] == 0).all()
+
+
+@window_matchers
+@pytest.mark.parametrize("rows", [7, 16, 40], ids=lambda rows: f"tiles of {rows} rows")
+def test_tiles_give_what_the_whole_image_gives(stage: Stage, rows: int) -> None:
+    params, inputs = WindowParams(d_min=0, d_max=8), {"images": shifted_pair(seed=2)}
+    noisy = inputs["images"]["right"]
+    noisy[:] = noisy // 2 + np.random.default_rng(1).integers(0, 90, noisy.shape, dtype=np.uint8)
+    assert same(tiled(stage, params, inputs, DIMS, rows), whole(stage, params, inputs, DIMS))
+
+
+def test_sgm_says_nothing_where_the_search_would_leave_the_right_view() -> None:
+    found = matched(SGM, shifted_pair())
+    assert np.isnan(found["disparity"][:, 0]).all()
+    assert np.isfinite(found["dense"]).mean() > 0.99, "the dense map is asked everywhere"
+
+
+@matchers
+def test_a_range_is_needed(stage: Stage) -> None:
+    if stage.product in MODULES:
+        pytest.importorskip(MODULES[stage.product], reason="comes with the extra 'baselines'")
+    with pytest.raises(StageError, match="disparity range"):
+        stage.function()(stage.params(), {"images": shifted_pair()})
+
+
+@pytest.mark.parametrize(
+    ("stage", "settings", "message"),
+    [
+        pytest.param(CENSUS, {"window": 4}, "no centre", id="an even window"),
+        pytest.param(SGM, {"p1": 9, "p2": 9}, "above p1", id="penalties that do not rise"),
+        pytest.param(SNCC, {"d_min": 3, "d_max": 2}, "below d_min", id="a range the wrong way round"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(stage: Stage, settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        stage.params(**settings)
+
+
+def test_only_what_comes_with_the_extra_is_needed() -> None:
+    extra = {"opencv-python-headless", "mccnn", "scikit-learn"}
+    assert {name for stage in BASELINES for name in stage.needs} == extra
+    assert SgmParams().p2 > SgmParams().p1

@@ -1,0 +1,149 @@
+"""The comparison on the smallest scenes: every row there, every reason given, nothing computed twice."""
+
+import csv
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipeline import compare
+from pipeline.api import Task
+from pipeline.comparison import ABLATION, EXPERIMENTS, MATCHERS, MEASURES, Comparison
+from pipeline.comparison_report import COLUMNS, print_comparison, write_comparison
+from pipeline.environment import missing_packages
+from pipeline.errors import UsageError
+from pipeline.quoted import NAMED, QUOTED
+from stages.catalog import STAGES
+from tests.tiny import SETTINGS, SPEC, TEST_ONLY
+
+QUICK = (*SETTINGS, "o1_forest.samples=500", "ccnn_net.steps=2", "ccnn_net.batch=2", "ccnn_net.crop=16")
+Invoke = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def task(tmp_path_factory: pytest.TempPathFactory) -> Task:
+    return Task(SPEC, settings=QUICK, cache=tmp_path_factory.mktemp("compared") / "cache")
+
+
+@pytest.fixture(scope="module")
+def found(task: Task) -> Comparison:
+    return compare(task, train_on=SPEC)
+
+
+def installed(product: str) -> bool:
+    stage = STAGES[product]
+    return not any(missing_packages(STAGES[name]) for name in (product, *stage.inputs) if name in STAGES)
+
+
+def methods(found: Comparison, experiment: str) -> set[str]:
+    return {row["method"] for row in found.rows if row["experiment"] == experiment}
+
+
+def test_every_method_that_can_run_has_its_rows(found: Comparison) -> None:
+    matchers = {method for method, product in MATCHERS.items() if installed(product)}
+    assert methods(found, "raw") == matchers | {"dual-cnn, shipped weights"} | set(ABLATION)
+    assert methods(found, "density") == matchers | {"dual-cnn"}
+    assert methods(found, "auc") == {method for method, (product, _) in MEASURES.items() if installed(product)}
+
+
+def test_training_scenes_are_not_compared_on(found: Comparison) -> None:
+    assert found.scenes == ["test-0"]
+    assert any("train-0 is a training scene" in note for note in found.notes)
+
+
+def test_figures_hold_together(found: Comparison) -> None:
+    at = [row for row in found.rows if row["mask"] == "nonocc" and row["threshold_px"] == 1]
+    for row in at:
+        if row["experiment"] == "auc":
+            assert row["auc_optimal"] - 1e-6 <= row["auc"] <= 1
+        for name in ("raw_bad", "bad", "bad_dual_cnn", "invalid"):
+            assert 0 <= row.get(name, 0) <= 100
+    raw = next(row for row in at if row["method"] == "dual-cnn, shipped weights")
+    curve = next(row for row in at if row["experiment"] == "curve" and row["R"] == 0)
+    assert curve["bad"] == pytest.approx(raw["raw_bad"]), "R = 0 keeps all of a map without holes"
+    ours = next(row for row in at if row["experiment"] == "density" and row["method"] == "dual-cnn")
+    point = next(row for row in at if row["experiment"] == "curve" and row["R"] == ours["R"])
+    assert (point["invalid"], point.get("bad")) == (ours["invalid"], ours.get("bad"))
+
+
+def test_the_mean_of_one_scene_is_the_scene(found: Comparison) -> None:
+    assert [row["method"] for row in found.means] == [row["method"] for row in found.rows]
+    assert all(mean["scene"] == "mean of 1" for mean in found.means)
+    assert [row.get("auc") for row in found.means] == [row.get("auc") for row in found.rows]
+
+
+def test_a_second_comparison_computes_nothing_and_says_the_same(found: Comparison, task: Task) -> None:
+    again = compare(task, train_on=SPEC)
+    assert all(made.reused for made in again.result.made.values())
+    assert again.rows == found.rows
+
+
+def test_what_needs_training_says_so_without_a_training_set(found: Comparison, task: Task) -> None:
+    plain = compare(replace(task, dataset=TEST_ONLY), ("raw", "auc"))
+    reasons = {each["method"]: each["why"] for each in plain.unavailable}
+    assert all("--train-on" in reasons[method] for method in (*ABLATION, "CCNN"))
+    assert not methods(plain, "density")
+
+
+def test_without_a_package_its_rows_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    from pipeline import comparison, environment
+
+    monkeypatch.setattr(environment, "_installed", lambda _: False)
+    products, unavailable = comparison._available(EXPERIMENTS, True)
+    reasons = {each["method"]: each["why"] for each in unavailable}
+    assert products == ("sncc", "census", "cost_confidence", "ccnn")
+    assert "opencv-python-headless" in reasons["SGM (OpenCV SGBM)"] and "mccnn" in reasons["MC-CNN fast"]
+    assert "scikit-learn" in reasons["O1"]
+    assert set(NAMED) <= set(reasons)
+
+
+def test_files_hold_all_rows_and_what_is_quoted(found: Comparison, tmp_path: Path) -> None:
+    files = write_comparison(found, tmp_path / "new")
+    names = {"comparison.csv", "comparison.json", "raw.png", "auc.png", "density.png", "lighting.png", "texture.png"}
+    assert {file.name for file in files} == names
+    written = list(csv.DictReader(files[0].read_text().splitlines()))
+    assert tuple(written[0]) == COLUMNS
+    assert len(written) == len(found.rows) + len(found.means) + len(QUOTED)
+    assert sum(row["quoted"] == "True" for row in written) == len(QUOTED)
+    assert json.loads(files[1].read_text())["rows"] == found.rows
+    assert all(file.read_bytes().startswith(b"\x89PNG") for file in files[2:])
+
+
+def test_the_tables_name_every_method(found: Comparison, capsys: pytest.CaptureFixture[str]) -> None:
+    print_comparison(found, ["exact"])
+    out = capsys.readouterr().out
+    for method in (*ABLATION, *methods(found, "auc"), "optimal", "dual-cnn (paper)", "R-NCC", "TMAP"):
+        assert method in out, method
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        pytest.param(["--experiment", "row"], "did you mean raw", id="an experiment that does not exist"),
+        pytest.param(["--train-on", TEST_ONLY], "no training scene", id="nothing to train on"),
+        pytest.param(["--set", "sgm.windo=3"], "did you mean sgm.window", id="a setting that does not exist"),
+    ],
+)
+def test_a_mistake_is_one_line_and_writes_nothing(
+    invoke: Invoke, tmp_path: Path, arguments: list[str], message: str
+) -> None:
+    ran = invoke("compare", TEST_ONLY, *arguments, "-o", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
+    assert ran.code == 2 and message in ran.err and len(ran.err.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_single_baseline_without_its_package_is_refused(monkeypatch: pytest.MonkeyPatch, task: Task) -> None:
+    from pipeline import environment
+    from pipeline.api import status
+
+    monkeypatch.setattr(environment, "_installed", lambda _: False)
+    with pytest.raises(UsageError, match=r"sgm needs opencv-python-headless: pip install"):
+        status(task, "sgm")
+
+
+def test_training_is_asked_for_in_one_way_alone(task: Task) -> None:
+    with pytest.raises(UsageError, match="train_on"):
+        compare(replace(task, train=True))
