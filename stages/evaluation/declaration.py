@@ -19,9 +19,10 @@ class EvaluationSamplesParams(Params):
     """What the evaluation-Net learns from."""
 
     form: Literal["strided", "patch"] = Field("strided", description="grids of pixels, or the paper's single pixels")
-    samples: int = Field(16000, ge=1, description="grids in all, over the scenes in equal parts (strided)")
+    samples: int = Field(16000, ge=1, description="grids in all, over the maps in equal parts (strided)")
     rows: int = Field(12, ge=1, le=64, description="rows of a grid, 16 px apart (strided)")
     columns: int = Field(16, ge=1, le=64, description="columns of a grid, 16 px apart (strided)")
+    mirror: bool = Field(True, description="learn from the right views' maps too, mirrored, where their truth is known")
     tolerance: float = Field(1.0, gt=0, description="T_e: largest error of a disparity that counts as right, px")
     seed: int = Field(0, ge=0, description="seed of the draw")
 
@@ -34,7 +35,7 @@ class EvaluationNetParams(Schedule):
     batch: int = Field(
         8, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"
     )
-    flip: bool = Field(True, description="turn half of the samples upside down (mirroring would move the occlusions)")
+    flip: bool = Field(True, description="turn half of the samples upside down")
     relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting; 0: none, as the paper")
     prior: bool = Field(True, description="count with the samples' share of right disparities; false: with a half")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
@@ -50,9 +51,10 @@ class ConfidenceParams(Params):
 
 EVALUATION_SAMPLES = Stage(
     product="evaluation_samples",
-    inputs=("disparity", "truth"),
+    inputs=("disparity", "right_disparity", "truth"),
     outputs=(
         Output("scene", ("sample",), "int32", "1", "training scene, in the order of the split"),
+        Output("mirrored", ("sample",), "bool", "1", "of the right view, with both views flipped and exchanged"),
         Output("y", ("sample",), "int32", "px", "row of the grid's first pixel"),
         Output("x", ("sample",), "int32", "px", "column of the grid's first pixel"),
         Output("labels", ("sample", "row", "column"), "int8", "1", "1 right, 0 wrong, -1 unknown"),
@@ -64,7 +66,7 @@ EVALUATION_SAMPLES = Stage(
 
 EVALUATION_NET = Stage(
     product="evaluation_net",
-    inputs=("evaluation_samples", "images", "disparity"),
+    inputs=("evaluation_samples", "images", "disparity", "right_disparity"),
     outputs=(
         Output("parameters", ("parameter",), "float32", "1", "weights of the evaluation-Net"),
         Output("loss", ("step",), "float32", "1", "class-balanced cross-entropy of each training step"),

@@ -80,13 +80,13 @@ class EvaluationNet(nn.Module):
     def _early(self, maps: Tensor, pool: Pool) -> Tensor:
         """Return the first two convolutions of one layer: (B, 1, H, W) -> (B or 16 B, 32, ...)."""
         for conv in (self.conv1, self.conv2):
-            maps = pool(functional.relu(conv(maps)))
+            maps = functional.relu(pool(conv(maps)))  # the same as pooling last, on a quarter of the values
         return maps
 
     def _late(self, gray: Tensor, disparity: Tensor, pool: Pool) -> Tensor:
         """Return the logits from what ``_early`` made of the two layers."""
-        gray, disparity = (pool(functional.relu(self.conv3(maps))) for maps in (gray, disparity))
-        return self._head(pool(functional.relu(self.conv4_gray(gray) + self.conv4_disparity(disparity))))
+        gray, disparity = (functional.relu(pool(self.conv3(maps))) for maps in (gray, disparity))
+        return self._head(functional.relu(pool(self.conv4_gray(gray) + self.conv4_disparity(disparity))))
 
     def _head(self, features: Tensor) -> Tensor:
         logits: Tensor = self.out(functional.relu(self.fc(features)))

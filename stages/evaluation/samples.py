@@ -2,14 +2,20 @@
 
 A sample is a grid of pixels 16 px apart, as a pooled network answers at once. Both forms of training
 are of this kind: ``strided`` takes a grid of many pixels at a random place; ``patch``, the paper's way,
-takes single pixels, all mismatches of a scene and as many of its matches.
+takes single pixels, all mismatches of a map and as many of its matches.
+
+The maps are the left views' and, where the right view has ground truth, the right views' too, *mirrored*:
+of the pair with its views flipped and exchanged, the left one. They come from the same volumes.
 """
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stages.evaluation.declaration import STRIDE, EvaluationSamplesParams
-from stages.stage import Arrays, Inputs, StageError, by_scene
+from stages.stage import Inputs, StageError, by_scene
 
 UNKNOWN = -1
 """Label of a pixel whose truth is not known, or that lies outside the image."""
@@ -25,46 +31,65 @@ def draw_samples(params: EvaluationSamplesParams, inputs: Inputs) -> dict[str, N
     """Draw the samples of all training scenes, in random order.
 
     Returns:
-        ``scene``, ``y``, ``x`` int32 (sample,): the grid's first pixel; ``labels`` int8 (sample, row, column):
-        1 right, 0 wrong, -1 unknown.
+        ``scene`` int32, ``mirrored`` bool, ``y`` and ``x`` int32 (sample,): the grid's first pixel;
+        ``labels`` int8 (sample, row, column): 1 right, 0 wrong, -1 unknown.
 
     Raises:
         StageError: if no scene has a pixel with a known truth, or, for ``patch``, none has a wrong one.
     """
     rng = np.random.default_rng(params.seed)
-    pairs = zip(by_scene(inputs, "disparity"), by_scene(inputs, "truth"), strict=True)
-    labels = [_labels(disparity, truth, params.tolerance) for disparity, truth in pairs]
-    if all((label == UNKNOWN).all() for label in labels):
+    maps = _maps(params, inputs)
+    if all((each.labels == UNKNOWN).all() for each in maps):
         raise StageError("no training scene has a pixel with a known disparity")
-    places = _patches(labels, rng) if params.form == "patch" else _grids(params, labels, rng)
+    places = _patches(maps, rng) if params.form == "patch" else _grids(params, maps, rng)
     shape = (1, 1) if params.form == "patch" else (params.rows, params.columns)
-    grids = [_grid(labels[scene], y, x, shape) for scene, y, x in places]
-    scene, y, x = places.T.astype(np.int32)
-    return {"scene": scene, "y": y, "x": x, "labels": np.stack(grids)}
+    chosen, y, x = places.T
+    return {
+        "scene": np.array([maps[index].scene for index in chosen], np.int32),
+        "mirrored": np.array([maps[index].mirrored for index in chosen]),
+        "y": y.astype(np.int32),
+        "x": x.astype(np.int32),
+        "labels": np.stack([_grid(maps[index].labels, row, column, shape) for index, row, column in places]),
+    }
 
 
-def _labels(disparity: Arrays, truth: Arrays, tolerance: float) -> NDArray[np.int8]:
-    return label_pixels(disparity["disparity"], truth["disparity"], tolerance)
+@dataclass(frozen=True)
+class _Map:
+    """A raw map to learn from: whose it is, and int8 (y, x) which of its pixels are right."""
+
+    scene: int
+    mirrored: bool
+    labels: NDArray[np.int8]
 
 
-def _grids(
-    params: EvaluationSamplesParams, labels: list[NDArray[np.int8]], rng: np.random.Generator
-) -> NDArray[np.int64]:
-    """Return (scene, y, x) of grids at random places that reach over the image as little as they must."""
+def _maps(params: EvaluationSamplesParams, inputs: Inputs) -> list[_Map]:
+    """Return the left view's map of each scene, and the right view's, mirrored, if its truth is known."""
+    products = (by_scene(inputs, product) for product in ("disparity", "right_disparity", "truth"))
+    found = []
+    for scene, (left, right, truth) in enumerate(zip(*products, strict=True)):
+        found.append(_Map(scene, False, label_pixels(left["disparity"], truth["disparity"], params.tolerance)))
+        if params.mirror and np.isfinite(truth["right_disparity"]).any():
+            labels = label_pixels(right["disparity"], truth["right_disparity"], params.tolerance)
+            found.append(_Map(scene, True, labels[:, ::-1]))
+    return found
+
+
+def _grids(params: EvaluationSamplesParams, maps: Sequence[_Map], rng: np.random.Generator) -> NDArray[np.int64]:
+    """Return (map, y, x) of grids at random places that reach over the image as little as they must."""
     span = STRIDE * (np.array((params.rows, params.columns)) - 1) + 1
-    scenes = rng.permutation(np.arange(params.samples) % len(labels))
+    chosen = rng.permutation(np.arange(params.samples) % len(maps))
     # A grid larger than the image still starts anywhere in its first 16 pixels, so that every offset is learnt.
-    spare = np.array([np.maximum(np.array(labels[scene].shape) - span + 1, STRIDE) for scene in scenes])
-    return np.column_stack([scenes, rng.integers(0, spare)])
+    spare = np.array([np.maximum(np.array(maps[index].labels.shape) - span + 1, STRIDE) for index in chosen])
+    return np.column_stack([chosen, rng.integers(0, spare)])
 
 
-def _patches(labels: list[NDArray[np.int8]], rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return (scene, y, x) of all wrong pixels and as many right ones of each scene, in random order."""
+def _patches(maps: Sequence[_Map], rng: np.random.Generator) -> NDArray[np.int64]:
+    """Return (map, y, x) of all wrong pixels and as many right ones of each map, in random order."""
     places = []
-    for scene, label in enumerate(labels):
-        wrong, right = np.argwhere(label == 0), np.argwhere(label == 1)
+    for index, each in enumerate(maps):
+        wrong, right = np.argwhere(each.labels == 0), np.argwhere(each.labels == 1)
         chosen = np.concatenate([wrong, right[rng.permutation(len(right))[: len(wrong)]]])
-        places.append(np.column_stack([np.full(len(chosen), scene), chosen]))
+        places.append(np.column_stack([np.full(len(chosen), index), chosen]))
     if not any(map(len, places)):
         raise StageError("no training scene has a wrong disparity to learn from: use the form 'strided'")
     return rng.permutation(np.concatenate(places))

@@ -17,6 +17,9 @@ from stages.schedule import SHARDS
 from stages.stage import Arrays, Inputs, Monitor, Silent, by_scene
 from stages.training import balanced_cross_entropy, fit
 
+Sides = tuple[NDArray[np.float32], NDArray[np.float32]]
+"""The layers (layer, y, x) of the left view and its map, and of the right view and its map, mirrored."""
+
 
 def train_evaluation_net(
     params: EvaluationNetParams, inputs: Inputs, monitor: Monitor | None = None
@@ -25,14 +28,14 @@ def train_evaluation_net(
 
     Args:
         params: schedule and augmentation.
-        inputs: ``images`` and ``disparity`` of every training scene, and ``evaluation_samples``.
+        inputs: ``images``, ``disparity`` and ``right_disparity`` of every training scene, and ``evaluation_samples``.
         monitor: progress and checkpoints.
 
     Returns:
         ``parameters`` float32 (parameter,) and ``loss`` float32 (step,).
     """
-    pairs = zip(by_scene(inputs, "images"), by_scene(inputs, "disparity"), strict=True)
-    scenes = [_layers(images, disparity) for images, disparity in pairs]
+    products = (by_scene(inputs, product) for product in ("images", "disparity", "right_disparity"))
+    scenes = [_sides(*scene) for scene in zip(*products, strict=True)]
     net = EvaluationNet().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     initialise(net, params.seed)
     samples = inputs["evaluation_samples"]
@@ -65,16 +68,18 @@ def _undo_the_balance(net: EvaluationNet, labels: NDArray[np.int8]) -> None:
             net.out.bias[1] += np.log(right / wrong)
 
 
-def _layers(images: Arrays, disparity: Arrays) -> NDArray[np.float32]:
-    """Return the layers of one scene."""
-    return evaluation_layers(images["left"], images["moments"][0], disparity["disparity"])
+def _sides(images: Arrays, left: Arrays, right: Arrays) -> Sides:
+    """Return the layers of one scene, upright and mirrored."""
+    upright = evaluation_layers(images["left"], images["moments"][0], left["disparity"])
+    mirrored = evaluation_layers(images["right"], images["moments"][1], right["disparity"])[:, :, ::-1]
+    return upright, mirrored
 
 
 def cut_crop(
     params: EvaluationNetParams,
     samples: Arrays,
     index: int,
-    scenes: Sequence[NDArray[np.float32]],
+    scenes: Sequence[Sides],
     rng: np.random.Generator,
 ) -> NDArray[np.float32]:
     """Cut out what the grid of one sample depends on; beyond the image the nearest pixel, as in inference.
@@ -82,7 +87,7 @@ def cut_crop(
     Returns:
         float32 (layer, 101 + 16 (rows - 1), 101 + 16 (columns - 1)).
     """
-    scene = scenes[int(samples["scene"][index])]
+    scene = scenes[int(samples["scene"][index])][int(samples["mirrored"][index])]
     rows, columns = (
         np.clip(np.arange(first - RADIUS, first - RADIUS + PATCH + STRIDE * (count - 1)), 0, length - 1)
         for first, count, length in zip(

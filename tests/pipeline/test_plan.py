@@ -175,7 +175,10 @@ def test_a_setting_makes_stale_exactly_what_depends_on_it(
         ("stages.transforms.rank", ALL - ABOVE_CHANNELS),
         ("stages.matching.train", ALL - ABOVE_CHANNELS - {"channels"}),
         ("stages.matching.cost_volume", ALL - ABOVE_CHANNELS - {"channels", "matching_net"}),
-        ("stages.disparity", {"disparity", "evaluation_samples", "evaluation_net"} | BELOW_DISPARITY),
+        (
+            "stages.disparity",
+            {"disparity", "right_disparity", "evaluation_samples", "evaluation_net"} | BELOW_DISPARITY,
+        ),
         ("stages.filtering", {"semidense", "metrics"}),
         ("stages.metrics.stage", {"metrics"}),
         ("datasets.synthetic", ALL),

@@ -27,6 +27,10 @@ def weights_of_no_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> It
     shipped.weights_digest.cache_clear()
 
 
+TRAINING = {"matching_samples", "right_disparity", "evaluation_samples"}
+"""Products of a whole run that only a training needs."""
+
+
 def graph(*settings: str, upto: str = "metrics", train: bool = False, dataset: Dataset = DATASET) -> Graph:
     training = training_scenes(dataset) if train else ()
     return build(Request(dataset, {"": Config.load(None, settings)}, upto, train, training))
@@ -38,9 +42,7 @@ def counts(made: Graph) -> Counter[str]:
 
 def test_without_training_every_scene_is_worked_on_with_the_shipped_weights() -> None:
     made = graph()
-    assert counts(made) == Counter(dict.fromkeys(PATH - {"matching_samples", "evaluation_samples"}, 4)) - Counter(
-        dict.fromkeys(SHIPPED, 3)
-    )
+    assert counts(made) == Counter(dict.fromkeys(PATH - TRAINING, 4)) - Counter(dict.fromkeys(SHIPPED, 3))
     assert made.notes == []
     assert len(made.targets) == 4
 
@@ -49,7 +51,8 @@ def test_with_training_the_training_scenes_are_only_learnt_from() -> None:
     made = graph(train=True)
     four = dict.fromkeys(("images", "truth", "channels", "costvolume", "disparity"), 4)
     one = dict.fromkeys(("matching_samples", "matching_net", "evaluation_samples", "evaluation_net"), 1)
-    assert counts(made) == Counter({**four, **one, **dict.fromkeys(("confidence", "semidense", "metrics"), 2)})
+    two = dict.fromkeys(("right_disparity", "confidence", "semidense", "metrics"), 2)
+    assert counts(made) == Counter({**four, **one, **two})
     assert [made.steps[each].scene for each, _ in made.targets] == ["test-0", "test-1"]
     assert [note.split(" ")[0] for note in made.notes] == ["train-0", "train-1"]
 
@@ -204,6 +207,7 @@ def test_a_step_of_the_split_takes_one_input_a_scene() -> None:
         "evaluation_samples": 1,
         "images": 2,
         "disparity": 2,
+        "right_disparity": 2,
     }
     recipe = step.recipe({name: name for name in made.steps})
     assert [made.steps[each].scene for each in recipe.inputs["images"]] == ["train-0", "train-1"]

@@ -51,15 +51,23 @@ def random_layers(height: int, width: int, seed: int = 0) -> np.ndarray:
 
 
 def scene(seed: int = 0, height: int = 40, width: int = 56) -> dict[str, dict[str, np.ndarray]]:
-    """Return a scene whose disparities are right on the left half and wrong by 3 px, and rough, on the right."""
+    """Return a scene whose disparities are right on the left half and wrong by 3 px, and rough, on the right.
+
+    The right view's are wrong by 5 px in the last eight rows; its truth is not known in the first six.
+    """
     rng = np.random.default_rng(seed)
     truth = np.full((height, width), 3, np.float32)
     disparity = truth + rng.uniform(-0.5, 0.5, truth.shape).astype(np.float32)
     disparity[:, width // 2 :] += 3 * rng.choice(np.float32([-1, 1]), (height, width - width // 2))
     truth[:2], disparity[3, 3] = np.nan, np.nan
-    left = rng.integers(0, 256, (height, width, 1)).astype(np.uint8)
+    left, right = (rng.integers(0, 256, (height, width, 1)).astype(np.uint8) for _ in range(2))
+    right_truth = np.full((height, width), 4, np.float32)
+    right_disparity = right_truth + rng.uniform(-0.5, 0.5, truth.shape).astype(np.float32)
+    right_disparity[-8:] += 5
+    right_truth[:6] = np.nan
     return {
-        "images": {"left": left, "moments": np.array([[127.0, 74.0], [127.0, 74.0]])},
+        "images": {"left": left, "right": right, "moments": np.array([[127.0, 74.0], [125.0, 70.0]])},
         "disparity": {"disparity": disparity},
-        "truth": {"disparity": truth},
+        "right_disparity": {"disparity": right_disparity},
+        "truth": {"disparity": truth, "right_disparity": right_truth},
     }

@@ -9,11 +9,13 @@ from tests.stages.tiling import same
 
 N = np.nan
 SMALL = {"samples": 30, "rows": 2, "columns": 3}
+LEFT = SMALL | {"mirror": False}
+"""From the left views' maps alone."""
 forms = pytest.mark.parametrize("form", ["strided", "patch"])
 
 
 def inputs(*scenes: dict[str, dict[str, np.ndarray]]) -> dict[str, list]:
-    return {name: [one[name] for one in scenes or (scene(),)] for name in ("disparity", "truth")}
+    return {name: [one[name] for one in scenes or (scene(),)] for name in (scene() if not scenes else scenes[0])}
 
 
 @pytest.mark.parametrize(
@@ -54,14 +56,15 @@ def test_a_seed_gives_one_draw_and_another_seed_another(form: str) -> None:
 def test_a_grid_has_the_labels_of_pixels_16_px_apart() -> None:
     given = scene()
     labels = label_pixels(given["disparity"]["disparity"], given["truth"]["disparity"], 1.0)
-    made = draw_samples(EvaluationSamplesParams(**SMALL), inputs(given))
+    made = draw_samples(EvaluationSamplesParams(**LEFT), inputs(given))
+    assert not made["mirrored"].any()
     for index in range(30):
         y, x = made["y"][index], made["x"][index]
         assert np.array_equal(made["labels"][index], labels[y : y + 17 : 16, x : x + 33 : 16])
 
 
 def test_a_grid_larger_than_the_image_starts_in_its_first_16_pixels() -> None:
-    params = EvaluationSamplesParams(samples=300, rows=4, columns=2)
+    params = EvaluationSamplesParams(samples=300, rows=4, columns=2, mirror=False)
     made = draw_samples(params, inputs(scene(height=40, width=30)))
     assert np.unique(made["y"]).tolist() == list(range(16)), "every offset is learnt"
     assert np.unique(made["x"]).tolist() == list(range(16))
@@ -72,7 +75,7 @@ def test_a_grid_larger_than_the_image_starts_in_its_first_16_pixels() -> None:
 def test_patches_are_all_the_wrong_pixels_and_as_many_right_ones() -> None:
     given = scene()
     labels = label_pixels(given["disparity"]["disparity"], given["truth"]["disparity"], 1.0)
-    made = draw_samples(EvaluationSamplesParams(form="patch"), inputs(given))
+    made = draw_samples(EvaluationSamplesParams(form="patch", mirror=False), inputs(given))
     found = made["labels"][:, 0, 0]
     assert np.array_equal(found, labels[made["y"], made["x"]])
     wrong = np.sort(np.flatnonzero(labels == 0))
@@ -83,8 +86,26 @@ def test_patches_are_all_the_wrong_pixels_and_as_many_right_ones() -> None:
 
 
 def test_scenes_take_equal_parts() -> None:
-    made = draw_samples(EvaluationSamplesParams(**SMALL), inputs(scene(0), scene(1, 60, 30), scene(2)))
+    made = draw_samples(EvaluationSamplesParams(**LEFT), inputs(scene(0), scene(1, 60, 30), scene(2)))
     assert np.bincount(made["scene"]).tolist() == [10, 10, 10]
+
+
+def test_a_mirrored_grid_has_the_labels_of_the_right_view_from_its_right_edge_on() -> None:
+    given = scene()
+    labels = label_pixels(given["right_disparity"]["disparity"], given["truth"]["right_disparity"], 1.0)
+    made = draw_samples(EvaluationSamplesParams(**SMALL), inputs(given))
+    assert made["mirrored"].sum() == 15, "both maps take equal parts"
+    for index in np.flatnonzero(made["mirrored"]):
+        y, x = made["y"][index], 55 - made["x"][index]
+        assert np.array_equal(made["labels"][index], labels[y : y + 17 : 16, [x, x - 16, x - 32]])
+
+
+def test_a_right_view_without_truth_gives_no_samples() -> None:
+    given = scene()
+    given["truth"]["right_disparity"][:] = N
+    made = draw_samples(EvaluationSamplesParams(**SMALL), inputs(given, scene(1)))
+    assert np.bincount(made["scene"]).tolist() == [10, 20]
+    assert set(made["scene"][made["mirrored"]].tolist()) == {1}
 
 
 def test_every_scene_gives_its_patches() -> None:
@@ -94,12 +115,16 @@ def test_every_scene_gives_its_patches() -> None:
 
 
 def unknown() -> dict[str, dict[str, np.ndarray]]:
-    return scene() | {"truth": {"disparity": np.full((40, 56), N, np.float32)}}
+    nothing = np.full((40, 56), N, np.float32)
+    return scene() | {"truth": {"disparity": nothing, "right_disparity": nothing}}
 
 
 def perfect() -> dict[str, dict[str, np.ndarray]]:
     given = scene()
-    return given | {"disparity": {"disparity": np.nan_to_num(given["truth"]["disparity"])}}
+    truth = given["truth"]
+    given["disparity"]["disparity"] = np.nan_to_num(truth["disparity"])
+    given["right_disparity"]["disparity"] = np.nan_to_num(truth["right_disparity"])
+    return given
 
 
 @pytest.mark.parametrize(
@@ -127,4 +152,4 @@ def test_one_scene_without_truth_is_no_reason_to_refuse() -> None:
 
 def test_refuses_no_scene() -> None:
     with pytest.raises(StageError, match="name a dataset with a training split"):
-        draw_samples(EvaluationSamplesParams(), {"disparity": [], "truth": []})
+        draw_samples(EvaluationSamplesParams(), {"disparity": [], "right_disparity": [], "truth": []})

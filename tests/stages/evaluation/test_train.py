@@ -16,13 +16,19 @@ from tests.stages.monitors import InterruptedTrainingError, Memory
 def inputs(**settings: object) -> dict[str, object]:
     given = scene()
     params = EvaluationSamplesParams(**({"samples": 20, "rows": 2, "columns": 3} | settings))
-    samples = draw_samples(params, {name: [given[name]] for name in ("disparity", "truth")})
-    return {"images": [given["images"]], "disparity": [given["disparity"]], "evaluation_samples": samples}
+    lists = {name: [product] for name, product in given.items()}
+    return lists | {"evaluation_samples": draw_samples(params, lists)}
 
 
-def layers() -> np.ndarray:
+def sides() -> tuple[np.ndarray, np.ndarray]:
+    """The layers of the scene and of its mirrored pair."""
     given = scene()
-    return evaluation_layers(given["images"]["left"], given["images"]["moments"][0], given["disparity"]["disparity"])
+    moments = given["images"]["moments"]
+    left = evaluation_layers(given["images"]["left"], moments[0], given["disparity"]["disparity"])
+    right = evaluation_layers(
+        given["images"]["right"][:, ::-1], moments[1], given["right_disparity"]["disparity"][:, ::-1]
+    )
+    return left, right
 
 
 def settings(**changes: object) -> EvaluationNetParams:
@@ -33,14 +39,15 @@ def settings(**changes: object) -> EvaluationNetParams:
 def test_training_sees_what_inference_sees(form: str) -> None:
     """The answers of a training crop, at the image's border too, are the confidences of its grid's pixels."""
     net, samples = random_net(), inputs(form=form)["evaluation_samples"]
-    dense = confidence(net, layers())
-    for index in range(4):
-        crop = cut_crop(settings(relight=0), samples, index, [layers()], np.random.default_rng(0))
+    dense = [confidence(net, layers) for layers in sides()]
+    assert set(samples["mirrored"][:8].tolist()) == {False, True}
+    for index in range(8):
+        crop = cut_crop(settings(relight=0), samples, index, [sides()], np.random.default_rng(0))
         rows, columns = samples["labels"].shape[1:]
         assert crop.shape == (2, 101 + 16 * (rows - 1), 101 + 16 * (columns - 1))
         logits = net(torch.from_numpy(crop)[None]).detach()[0]
         y, x = samples["y"][index], samples["x"][index]
-        expected = dense[y::16, x::16][:rows, :columns]
+        expected = dense[int(samples["mirrored"][index])][y::16, x::16][:rows, :columns]
         made = torch.sigmoid(logits[1] - logits[0]).numpy()[: expected.shape[0], : expected.shape[1]]
         assert np.abs(made - expected).max() <= 1e-4
 
@@ -58,7 +65,7 @@ def test_upside_down_answers_come_in_the_upright_order() -> None:
 
 def test_light_changes_the_gray_layer_only() -> None:
     samples = inputs()["evaluation_samples"]
-    plain, lit = (cut_crop(settings(relight=r), samples, 0, [layers()], np.random.default_rng(0)) for r in (0, 1))
+    plain, lit = (cut_crop(settings(relight=r), samples, 0, [sides()], np.random.default_rng(0)) for r in (0, 1))
     assert not np.array_equal(plain[0], lit[0])
     assert np.array_equal(plain[1], lit[1])
 
@@ -102,10 +109,10 @@ def test_a_training_that_was_killed_ends_as_an_undisturbed_one() -> None:
 
 
 def test_it_learns_that_rough_disparities_are_wrong() -> None:
-    given = inputs(samples=40, rows=2, columns=3)
+    given = inputs(samples=40, rows=2, columns=3, mirror=False)
     made = train_evaluation_net(settings(steps=20, relight=0.0), given)
     assert made["loss"][-5:].mean() < 0.8 * made["loss"][0]
     net = EvaluationNet()
     from_vector(net, made["parameters"])
-    trusted = confidence(net, layers())
+    trusted = confidence(net, sides()[0])
     assert trusted[4:, :20].mean() > trusted[4:, 36:].mean() + 0.1
