@@ -1,11 +1,11 @@
-"""Fill in what a configuration leaves open: a scene's range of disparities, this machine's precision."""
+"""Fill in what a configuration leaves open, and refuse what does not go together."""
 
 from typing import Any
 
 from pydantic import ValidationError
 
 from datasets import SceneSource
-from pipeline.config import one_line
+from pipeline.config import Config, one_line
 from pipeline.errors import UsageError
 from stages.precision import resolve
 from stages.stage import Params
@@ -35,3 +35,16 @@ def _require_within(params: Params, scene: SceneSource) -> None:
         value = getattr(params, name, None)
         if value is not None and abs(value) >= width:
             raise UsageError(f"{scene.name}: {name} is {value} px, but the image is only {width} px wide")
+
+
+def require_trainable(config: Config) -> None:
+    """Refuse to train with another light on the gray channel where there is none: it would fall on another channel.
+
+    Raises:
+        UsageError: if ``matching_net.relight`` is on and ``channels.use`` leaves gray out.
+    """
+    if config.matching_net.relight and "gray" not in config.channels.use:
+        raise UsageError(
+            "matching_net.relight changes the light of the gray channel, which channels.use leaves out: "
+            "set matching_net.relight=0"
+        )

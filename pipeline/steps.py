@@ -16,7 +16,7 @@ from pipeline import shipped, sources
 from pipeline.config import Config, nearest
 from pipeline.environment import environment
 from pipeline.errors import UsageError
-from pipeline.resolution import resolved
+from pipeline.resolution import require_trainable, resolved
 from stages.catalog import CATALOG, STAGES
 from stages.stage import Params, Stage
 
@@ -139,12 +139,14 @@ def build(request: Request) -> Graph:
     """Return the steps that a request needs.
 
     Raises:
-        UsageError: if there is nothing to do.
+        UsageError: if there is nothing to do, or settings do not go together.
         StageError: if shipped weights are needed and there are none.
     """
     graph = Graph(notes=list(request.notes))
     trained_on = {_identity(scene) for scene in request.training}
     for variant, config in request.configs.items():
+        if request.train:
+            require_trainable(config)
         builder = _Builder(graph, config, request)
         graph.targets += [(step_id, variant) for step_id in _targets(builder, trained_on)]
     # The order of the products is one in which each comes after its inputs, whichever scenes they belong to.

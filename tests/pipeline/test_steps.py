@@ -245,3 +245,10 @@ def test_the_truth_s_key_holds_the_range() -> None:
         for each in (scene, wider)
     ]
     assert keys[0] != keys[1]
+
+
+def test_no_light_falls_on_other_channels_than_gray() -> None:
+    without_gray = 'channels.use=["rank", "companion"]'
+    with pytest.raises(UsageError, match="changes the light of the gray channel"):
+        graph(without_gray, train=True)
+    assert graph(without_gray, "matching_net.relight=0", train=True)
