@@ -36,6 +36,7 @@ from pipeline.naming import safe_names
 from pipeline.pairs import Match
 from pipeline.tasks import provenance
 from pipeline.views.png import explaining, write_rgb
+from stages.evaluation.calibration_table import told
 
 _POINTS = "x right, y up, z towards the viewer; metres, from the left camera"
 
@@ -111,7 +112,7 @@ class _Writer:
     def write_pictures(self) -> None:
         """Write what is for the eye."""
         self._draw(self.match.wishes.product, "disparity-colour.png")
-        self._draw("confidence", "confidence-colour.png")
+        self._draw(self.match.wishes.confidence, "confidence-colour.png")
         if self.match.wishes.fill:
             write_rgb(
                 self.match.guessed.astype(np.uint8)[..., np.newaxis].repeat(3, axis=2) * 255,
@@ -145,6 +146,17 @@ class _Writer:
         return about
 
 
+def _basis(match: Match) -> dict[str, Any]:
+    """Return where R comes from; for a wanted error, what it did in training scenes."""
+    if not match.choice:
+        return {
+            "R_from": "from the pair's own confidences, for the density asked for" if match.wishes.density else "as set"
+        }
+    found = match.choice
+    words = f"R = {told(match.R)}: {found.words}"
+    return {"R_from": "for the error asked for", "R_basis": words, "expected_error_percent": 100 * found.error}
+
+
 def summary(match: Match) -> dict[str, Any]:
     """Return what is to be said of a matched pair, ready for JSON."""
     steps = [each for each in match.result.made.values() if each.step.scene == match.scene.name]
@@ -159,7 +171,7 @@ def summary(match: Match) -> dict[str, Any]:
         "reference_view": "left",
         "disparities": asdict(match.disparities) | {"estimated": list(match.scene.open_ends)},
         "R": match.R,
-        "R_from": "from the pair's own confidences, for the density asked for" if wishes.density else "as set",
+        **_basis(match),
         "wishes": asdict(wishes),
         "density_percent": 100 * match.density,
         "guessed_percent": 100 * float(match.guessed.mean()),

@@ -52,10 +52,10 @@ def _request(config: Config, train: bool) -> Request:
 
 @cache
 def below(product: str) -> frozenset[str]:
-    """Return a product and all that is made from it, as the stages declare."""
+    """Return a product and all that is made from it, as the stages declare for the default settings."""
     found = {product}
     for stage in STAGES.values():
-        if found & set(stage.inputs):
+        if found & set(getattr(stage.params(), "inputs", stage.inputs)):
             found.add(stage.product)
     return frozenset(found)
 
