@@ -113,10 +113,11 @@ def _carry_out(
     task: "Task", wishes: "Wishes", output: Path, kinds: Sequence[str], how: dict[str, Any], as_json: bool
 ) -> None:
     from pipeline import console
-    from pipeline.match_files import save_all
+    from pipeline.match_files import require_place, save_all
     from pipeline.pairs import match_all
     from pipeline.progress import ProgressWatch
 
+    require_place(output)
     with ProgressWatch() as watch:
         found = match_all(task, wishes, watch=watch, **how)
     summaries = save_all(found, output, kinds)
@@ -182,7 +183,7 @@ def _formats(text: str) -> list[str]:
     from pipeline.errors import UsageError
     from pipeline.map_files import FORMATS
 
-    chosen = [kind.strip() for kind in text.split(",") if kind.strip()]
+    chosen = list(dict.fromkeys(kind.strip() for kind in text.split(",") if kind.strip()))
     for kind in chosen:
         if kind not in FORMATS:
             raise UsageError(f"no format {kind!r}; {nearest(kind, FORMATS)}")

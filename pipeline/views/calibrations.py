@@ -36,7 +36,9 @@ def _draw_reliability(axes: Axes, table: Table, dataset: xr.Dataset) -> None:
     axes.plot(probability(centres[told]), share, color=BLUE, marker="o", label="held-out training scenes")
     axes.plot(probability(EDGES), probability(dataset["log_odds"].values), color=ORANGE, label=f"map: {chosen}")
     told_scores = ", ".join(f"{name} {score:.4f}" for name, score in zip(MAPS, scores, strict=True))
-    axes.set(xlabel=f"confidence (0 to 1)\nBrier score: {told_scores}", ylabel="right (0 to 1)", xlim=(0, 1), ylim=(0, 1))
+    axes.set(
+        xlabel=f"confidence (0 to 1)\nBrier score: {told_scores}", ylabel="right (0 to 1)", xlim=(0, 1), ylim=(0, 1)
+    )
     axes.legend(loc="upper left", frameon=False)
     axes.grid(alpha=0.3)
 
