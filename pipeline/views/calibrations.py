@@ -5,7 +5,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.views.colours import BLUE, ORANGE, QUIET, SKY
+from pipeline.views.colours import BLUE, ORANGE, QUIET
 from stages.evaluation.calibration_declaration import MAPS
 from stages.evaluation.calibration_table import EDGES, Table, choices, probability
 
@@ -13,10 +13,12 @@ _WIDER = 20
 """Bins of the table in one point of the diagram."""
 _FEWEST = 50
 """Pixels that a point must stand for."""
+_MARKED = (0.5, 0.8, 0.9, 0.95, 0.98, 0.99)
+_NEAR = 0.02
 
 
 def draw_calibration(figure: Figure, dataset: xr.Dataset) -> None:
-    """Draw the reliability in held-out scenes with the chosen map, and error and kept pixels over R."""
+    """Draw the reliability in held-out scenes with the chosen map, and what R keeps and how much of it is wrong."""
     figure.set_size_inches(11, 5)
     table = Table.of({name: dataset[name].values for name in ("right", "wrong", "tolerance")})
     left, right = figure.subplots(1, 2)
@@ -45,10 +47,14 @@ def _draw_reliability(axes: Axes, table: Table, dataset: xr.Dataset) -> None:
 
 def _draw_choices(axes: Axes, table: Table) -> None:
     found = choices(table)
-    axes.plot([each.R for each in found], [100 * each.error for each in found], color=BLUE, label="wrong, of the kept")
-    axes.plot([each.R for each in found], [100 * each.kept for each in found], color=SKY, label="kept")
-    axes.set(xlabel="R (0 to 1)", ylabel=f"pixels (%), mean of {len(table.right)} scenes", xlim=(0, 1))
-    axes.set_yscale("log")
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.legend(frameon=False)
+    axes.plot([100 * each.kept for each in found], [100 * each.error for each in found], color=BLUE)
+    for R in _MARKED:
+        near = min(found, key=lambda each: abs(each.R - R), default=None)
+        if near and abs(near.R - R) < _NEAR:
+            place = 100 * near.kept, 100 * near.error
+            axes.plot(*place, color=BLUE, marker="o")
+            axes.annotate(f"R = {R:g}", place, xytext=(6, -12), textcoords="offset points")
+    scenes = f"mean of {len(table.right)} scenes"
+    axes.set(xlabel=f"kept (% of the pixels), {scenes}", ylabel=f"wrong (% of the kept), {scenes}", xlim=(0, 100))
+    axes.set_ylim(bottom=0)
     axes.grid(alpha=0.3)

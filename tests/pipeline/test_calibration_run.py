@@ -2,10 +2,12 @@
 
 import json
 from collections.abc import Callable, Iterator
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import pytest
+from safetensors import safe_open
 
 from pipeline import shipped
 from pipeline.api import Result, Task, run
@@ -53,8 +55,6 @@ def test_every_pixel_of_known_truth_is_counted(calibrated: Result) -> None:
 
 
 def test_the_file_holds_the_table_and_how_it_was_made(calibrated: Result, tmp_path: Path) -> None:
-    from safetensors import safe_open
-
     written = export(calibrated, tmp_path)
     names = [path.name for path in written]
     assert "calibration.safetensors" in names
@@ -189,3 +189,25 @@ def test_the_command_says_what_the_threshold_rests_on(
 def test_the_bins_are_wide_enough_for_both_ends() -> None:
     assert probability(EDGES[[0, -1]]).round(5).tolist() == [5e-05, 0.99995]
     assert EDGES.size == BINS + 1
+
+
+SHIPPED = {
+    name: resources.files("stages") / "weights" / f"{name}.safetensors" for name in ("evaluation_net", "calibration")
+}
+
+
+@pytest.mark.skipif(
+    not all(file.is_file() for file in SHIPPED.values()),
+    reason="stages/weights has no table: make calibration DATA=DIR",
+)
+def test_the_shipped_table_was_made_for_the_shipped_networks() -> None:
+    about = {}
+    for name, file in SHIPPED.items():
+        with safe_open(str(file), "numpy") as opened:
+            about[name] = {key: json.loads(text) for key, text in opened.metadata().items() if key != "product"}
+    net, table = about["evaluation_net"], about["calibration"]
+    assert table["training_data"]["disparity"] == net["training_data"]["disparity"], "the same raw maps"
+    for section in ("evaluation_samples", "evaluation_net"):
+        settings = [{**each["configuration"][section], "steps": None, "precision": None} for each in (net, table)]
+        assert settings[0] == settings[1]
+    assert len(read_table(SHIPPED["calibration"].read_bytes())["right"]) == len(net["training_data"]["disparity"])
