@@ -6,7 +6,6 @@ from typing import TypeVar
 from datasets import Dataset, SceneSource
 from pipeline.config import Config
 from pipeline.errors import UsageError
-from stages.evaluation.calibration_declaration import CalibrationParams
 
 _Scene = TypeVar("_Scene")
 
@@ -39,14 +38,14 @@ def with_folds(config: Config, names: Sequence[str]) -> Config:
             f"calibration.fold_of_scene names {len(set(folds))} folds of {len(folds)} scenes; there are {len(names)} "
             "training scenes, and it takes two folds at least"
         )
-    update: dict[str, object] = {"calibration": _update(params, fold_of_scene=folds)}
-    if params.steps is not None:
-        update["evaluation_net"] = config.evaluation_net.model_copy(update={"steps": params.steps})
+    parts = len(set(folds))
+    # A network of a fold sees a scene as often as the network of all does.
+    steps = params.steps or max(1, round(config.evaluation_net.steps * (parts - 1) / parts))
+    update = {
+        "calibration": params.model_copy(update={"fold_of_scene": folds}),
+        "evaluation_net": config.evaluation_net.model_copy(update={"steps": steps}),
+    }
     return config.model_copy(update=update)
-
-
-def _update(params: CalibrationParams, **fields: object) -> CalibrationParams:
-    return params.model_copy(update=fields)
 
 
 def outside(scenes: Sequence[_Scene], folds: Sequence[int], fold: int) -> tuple[_Scene, ...]:

@@ -36,8 +36,10 @@ def test_a_network_sees_the_other_folds_only() -> None:
 def test_the_configuration_gets_the_folds_and_their_schedule() -> None:
     config = with_folds(Config.load(settings=["calibration.steps=7"]), NAMES)
     assert config.calibration.fold_of_scene == (0, 1, 1, 0, 0)
-    assert (config.evaluation_net.steps, Config().evaluation_net.steps) == (7, 2000)
-    assert with_folds(Config(), NAMES).evaluation_net == Config().evaluation_net
+    assert config.evaluation_net.steps == 7
+    for folds, steps in ((2, 1000), (4, 1500)):
+        config = Config.load(settings=[f"calibration.folds={folds}", "evaluation_net.steps=2000"])
+        assert with_folds(config, NAMES).evaluation_net.steps == steps, "a scene is seen as often as by one for all"
 
 
 @pytest.mark.parametrize(
