@@ -14,6 +14,8 @@ from pipeline.api import Result, Task, run
 from pipeline.errors import StageRefused, UsageError
 from pipeline.exporter import export
 from pipeline.pairs import Wishes, match, match_all
+from pipeline.reporting.gathered import gather
+from pipeline.reporting.graph import graph
 from stages.evaluation.calibration_declaration import BINS
 from stages.evaluation.calibration_table import EDGES, Table, choose, probability
 from stages.stage import StageError
@@ -109,6 +111,8 @@ def test_a_wanted_error_decides_the_threshold_of_a_run(table: Path, tmp_path: Pa
     confidence = result.open("confidence")["confidence"].values
     assert np.array_equal(np.isfinite(kept["disparity"].values), confidence >= np.float32(expected.R))
     assert all("R" not in row for row in result.metrics), "R is the table's, not the user's"
+    drawn = graph(gather(Task(TEST_ONLY, settings=["semidense.max_error=0.02"], cache=cache)))
+    assert "semidense" in drawn
 
 
 def test_by_default_neither_table_nor_calibrated_confidence_is_made(table: Path, tmp_path: Path) -> None:
