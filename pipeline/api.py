@@ -19,8 +19,9 @@ from pipeline.config import Config, parse_setting
 from pipeline.errors import UsageError
 from pipeline.plan import Plan, Planned, make_plan
 from pipeline.ranges import close_ranges
-from pipeline.steps import Request, training_scenes
+from pipeline.steps import Request
 from pipeline.tasks import Made, Unwatched, Watch, provenance, read_arrays
+from pipeline.training_split import training_scenes
 
 if TYPE_CHECKING:
     import xarray as xr

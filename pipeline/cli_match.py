@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from pipeline.api import Task
     from pipeline.pairs import Match, Wishes
 
+_EXAMPLES = {"density": "80% or 0.8", "max-error": "2% or 0.02"}
+
 
 def register(app: typer.Typer) -> None:
     """Add the command to the command line."""
@@ -46,6 +48,12 @@ def match(
     density: Annotated[
         str | None, typer.Option(help="Keep this share of the image instead, the most confident; such as 80%.")
     ] = None,
+    max_error: Annotated[
+        str | None, typer.Option("--max-error", help="Keep what is wrong no more often than this; such as 2%.")
+    ] = None,
+    calibrated: Annotated[
+        bool, typer.Option("--calibrated", help="Give the confidence, and take --R, as a measured probability.")
+    ] = False,
     left_right: Annotated[bool, typer.Option("--left-right", help="Drop what the right view contradicts.")] = False,
     subpixel: Annotated[bool, typer.Option("--subpixel", help="Refine disparities below a pixel.")] = False,
     fill: Annotated[
@@ -74,7 +82,9 @@ def match(
     task = Task(pair_spec(sides, options), tuple(scene or ()), tuple(settings or ()), config, False, cache)
     wishes = Wishes(
         R=threshold,
-        density=_share(density),
+        density=_share("density", density),
+        max_error=_share("max-error", max_error),
+        calibrated=calibrated,
         left_right=left_right,
         subpixel=subpixel,
         fill=fill,
@@ -103,10 +113,11 @@ def _carry_out(
     task: "Task", wishes: "Wishes", output: Path, kinds: Sequence[str], how: dict[str, Any], as_json: bool
 ) -> None:
     from pipeline import console
-    from pipeline.match_files import save_all
+    from pipeline.match_files import require_place, save_all
     from pipeline.pairs import match_all
     from pipeline.progress import ProgressWatch
 
+    require_place(output)
     with ProgressWatch() as watch:
         found = match_all(task, wishes, watch=watch, **how)
     summaries = save_all(found, output, kinds)
@@ -123,11 +134,15 @@ def _carry_out(
 
 def _say(match: "Match", about: dict[str, Any]) -> None:
     """Print one pair's result: what was searched, what was kept, where it is."""
+    from stages.evaluation.calibration_table import told
+
     low, high = match.disparities.minimum, match.disparities.maximum
     ends = " (estimated from the images)" if match.scene.open_ends else ""
     print(f"{match.scene.name}: {about['rows']} x {about['columns']} px, disparities {low} to {high} px{ends}")
     kept = about["density_percent"] - about["guessed_percent"]
-    print(f"  kept {kept:.1f} % of the pixels, at R = {match.R:.3g} ({about['R_from']})")
+    print(f"  kept {kept:.1f} % of the pixels, at R = {told(match.R)} ({about['R_from']})")
+    if match.choice:
+        print(f"  {about['R_basis']}")
     if match.wishes.fill:
         print(f"  {about['guessed_percent']:.1f} % are filled in: guesses (guessed.png)")
     for note in about["notes"]:
@@ -144,7 +159,7 @@ def _results(found: "Sequence[Match]") -> list[Any]:
     return list(first.values())
 
 
-def _share(text: str | None) -> float | None:
+def _share(name: str, text: str | None) -> float | None:
     """Return what ``80%`` or ``0.8`` means.
 
     Raises:
@@ -159,7 +174,7 @@ def _share(text: str | None) -> float | None:
     except ValueError:
         value = float("nan")
     if not 0 < value <= 1:
-        raise UsageError(f"density {text!r}: write a share of the pixels, such as 80% or 0.8")
+        raise UsageError(f"{name} {text!r}: write a share of the pixels, such as {_EXAMPLES[name]}")
     return value
 
 
@@ -168,7 +183,7 @@ def _formats(text: str) -> list[str]:
     from pipeline.errors import UsageError
     from pipeline.map_files import FORMATS
 
-    chosen = [kind.strip() for kind in text.split(",") if kind.strip()]
+    chosen = list(dict.fromkeys(kind.strip() for kind in text.split(",") if kind.strip()))
     for kind in chosen:
         if kind not in FORMATS:
             raise UsageError(f"no format {kind!r}; {nearest(kind, FORMATS)}")

@@ -28,8 +28,9 @@ from pipeline.config import Config, nearest
 from pipeline.environment import missing_packages
 from pipeline.errors import UsageError
 from pipeline.quoted import NAMED
-from pipeline.steps import Request, training_scenes
+from pipeline.steps import Request
 from pipeline.tasks import Made, Watch, read_arrays
+from pipeline.training_split import training_scenes
 from stages.catalog import STAGES
 from stages.stage import Arrays
 

@@ -22,6 +22,7 @@ from stages.baselines.declaration import (
     WindowParams,
 )
 from stages.disparity_declaration import DisparityParams
+from stages.evaluation.calibration_declaration import CalibrationParams
 from stages.evaluation.declaration import ConfidenceParams, EvaluationNetParams, EvaluationSamplesParams
 from stages.filtering import SemidenseParams
 from stages.finishing.declaration import RefinedParams
@@ -52,6 +53,7 @@ class Config(BaseModel):
     evaluation_samples: EvaluationSamplesParams = EvaluationSamplesParams()
     evaluation_net: EvaluationNetParams = EvaluationNetParams()
     confidence: ConfidenceParams = ConfidenceParams()
+    calibration: CalibrationParams = CalibrationParams()
     semidense: SemidenseParams = SemidenseParams()
     refined: RefinedParams = RefinedParams()
     sgm: SgmParams = SgmParams()

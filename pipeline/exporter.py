@@ -6,6 +6,7 @@
         config.json                     what was asked for and with which settings each result was made
         metrics.csv                     the rows of the figures
         matching_net.safetensors        of trained networks; also evaluation_net.safetensors
+        calibration.safetensors         what the confidence was measured to be worth, if it was asked for
         SCENE/
             disparity.pfm               raw disparity, px; infinity: none
             disparity.png               the same in colours, black: none
@@ -32,8 +33,8 @@ from datasets.formats.pfm import write_pfm
 from pipeline.api import Result
 from pipeline.lineage import Wanted, lineage, wanted
 from pipeline.naming import safe_names
-from pipeline.steps import NETS
-from pipeline.tasks import Made, provenance
+from pipeline.steps import LEARNT
+from pipeline.tasks import Made, provenance, read_arrays
 from pipeline.views.colours import confidence_rgb, disparity_rgb, disparity_span
 from pipeline.views.png import explaining, write_rgb
 from stages.metrics.stage import ROW
@@ -82,17 +83,14 @@ class _Exporter:
 
     def __post_init__(self) -> None:
         """Find what there is, and name the scenes' folders."""
-        self.found = wanted(self.result, (*_MAPS, *NETS))
+        self.found = wanted(self.result, (*_MAPS, *LEARNT))
         self.scenes = safe_names(self.result.made[step_id].step.scene for step_id, _ in self.result.plan.targets)
 
     def write_networks(self) -> None:
-        """Write the trained networks; shipped weights are files already."""
+        """Write the trained networks and their calibration; shipped ones are files already."""
         for each in self.found:
-            if each.product in NETS:
-                arrays = self.result.store.arrays(each.made.key)
-                if "loss" in arrays:
-                    data = _weights(self.result, each.made, *(arrays[name][...] for name in ("parameters", "loss")))
-                    self._write(self.folder / f"{each.stem}.safetensors", data)
+            if each.product in LEARNT and each.made.step.inputs:
+                self._write(self.folder / f"{each.stem}.safetensors", _weights(self.result, each.made))
 
     def write_maps(self) -> None:
         """Write the maps of every scene, as numbers and in colours."""
@@ -153,21 +151,24 @@ class _Exporter:
         self.written.append(path)
 
 
-def _weights(result: Result, made: Made, parameters: Any, loss: Any) -> bytes:  # noqa: ANN401
-    """Return a trained network's file; its metadata tell how it was trained, and on what."""
+def _weights(result: Result, made: Made) -> bytes:
+    """Return the file of a trained network or a calibration; its metadata tell how it was made, and from what."""
     from stages.weights import save_weights
+    from stages.weights.tables import save_table
 
     entry = result.store.require(made.key)
     steps = {step.product: step for step in lineage(result.made, made.step.id, over_training=True) if step.stage.inputs}
     metadata = {
         "configuration": {product: step.settings for product, step in steps.items()},
         "training_data": entry.recipe.inputs,
-        "loss": float(np.mean(loss[-_LAST:], dtype=np.float64)),
-        "steps": int(loss.size),
         "versions": entry.extras.get("versions", {}),
         "key": entry.key,
     }
-    return save_weights(made.step.product, parameters, metadata)
+    arrays = read_arrays(result.store, made.key)
+    if made.step.product == "calibration":
+        return save_table(arrays, metadata)
+    loss = {"loss": float(np.mean(arrays["loss"][-_LAST:], dtype=np.float64)), "steps": int(arrays["loss"].size)}
+    return save_weights(made.step.product, arrays["parameters"], metadata | loss)
 
 
 def writable_folder(folder: Path) -> None:

@@ -30,7 +30,9 @@ class Wanted:
         return self.made.step.product
 
 
-def lineage(made: Mapping[str, Made | Planned], step_id: str, *, over_training: bool = False) -> list[Step]:
+def lineage(
+    made: Mapping[str, Made | Planned], step_id: str, *, over_training: bool = False, up_to: str | None = None
+) -> list[Step]:
     """Return a step and what it was made from, nearest first.
 
     Args:
@@ -38,12 +40,15 @@ def lineage(made: Mapping[str, Made | Planned], step_id: str, *, over_training: 
         step_id: the step.
         over_training: go on through the training scenes; without, only steps of the same scene and of the training
             split are in it, one a product.
+        up_to: a product beyond which not to go.
     """
     found: dict[str, Step] = {}
     waiting = [step_id]
     for each in waiting:
         if each not in found:
             found[each] = step = made[each].step
+            if step.product == up_to:
+                continue
             inputs = [ids for product, ids in step.inputs.items() if over_training or not step.takes_list(product)]
             waiting += [each for ids in inputs for each in ids]
     return list(found.values())
@@ -52,11 +57,13 @@ def lineage(made: Mapping[str, Made | Planned], step_id: str, *, over_training: 
 def wanted(result: Result, products: Sequence[str]) -> list[Wanted]:
     """Return the results of some products that stand behind what a run was asked for, scene by scene.
 
-    Those of the scenes asked for and of the training split; not those of scenes that were only trained on.
+    Those of the scenes asked for and of the training split; not those of scenes that were only trained on, nor the
+    networks of the folds of a calibration.
     """
     found: dict[tuple[str, str], dict[str, str]] = {}
     for step_id, variant in result.plan.targets:
-        split = [step for step in lineage(result.made, step_id, over_training=True) if step.scene == SPLIT]
+        behind = lineage(result.made, step_id, over_training=True, up_to="calibration")
+        split = [step for step in behind if step.scene == SPLIT]
         for step in [*split, *lineage(result.made, step_id)]:
             found.setdefault((step.scene, step.product), {}).setdefault(step.id, variant)
     scenes = dict.fromkeys(scene for scene, _ in found)

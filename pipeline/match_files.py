@@ -13,10 +13,12 @@
         guessed.png             if holes were filled: white where
         survey.png              if something looks wrong with the pair: where
 
-The files are made in a hidden folder beside their place and moved when all of them are there.
+The files are made in a hidden folder beside their place and moved when all of them are there. Those of an earlier match
+that this one does not write are deleted.
 """
 
 import json
+import os
 import secrets
 import shutil
 import sys
@@ -30,13 +32,29 @@ import numpy as np
 
 from datasets.formats.ply import write_ply
 from pipeline.api import open_product
+from pipeline.errors import UsageError
 from pipeline.exporter import writable_folder
-from pipeline.map_files import CONFIDENCE, DEPTH, DISPARITY, FORMATS, RIGHT_DISPARITY, Png16Error, Quantity, write_map
+from pipeline.map_files import (
+    CONFIDENCE,
+    DEPTH,
+    DISPARITY,
+    ENDINGS,
+    FORMATS,
+    RIGHT_DISPARITY,
+    Png16Error,
+    Quantity,
+    write_map,
+)
 from pipeline.naming import safe_names
 from pipeline.pairs import Match
 from pipeline.tasks import provenance
 from pipeline.views.png import explaining, write_rgb
+from stages.evaluation.calibration_table import told
 
+_SUMMARY = "summary.json"
+_QUANTITIES = (DISPARITY, CONFIDENCE, DEPTH, RIGHT_DISPARITY)
+_PICTURES = {"disparity-colour.png", "confidence-colour.png", "guessed.png", "survey.png", "points.ply"}
+"""What is written beside the maps."""
 _POINTS = "x right, y up, z towards the viewer; metres, from the left camera"
 
 
@@ -55,6 +73,19 @@ def save_all(matches: Sequence[Match], folder: Path, formats: Sequence[str] = FO
     return [save(match, place, formats) for match, place in zip(matches, places, strict=True)]
 
 
+def require_place(folder: Path) -> None:
+    """Refuse a folder that cannot be written, without making it: matching takes long.
+
+    Raises:
+        UsageError: if it, or the nearest folder above it that there is, is a file or closed to this user.
+    """
+    place = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+    if not place.is_dir():
+        raise UsageError(f"{folder}: cannot be written ({place} is a file); name another place")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise UsageError(f"{folder}: cannot be written (no permission in {place}); name another place")
+
+
 def save(match: Match, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Any]:
     """Write one pair; as `save_all`."""
     writable_folder(folder)
@@ -64,8 +95,7 @@ def save(match: Match, folder: Path, formats: Sequence[str] = FORMATS) -> dict[s
         writer.write_pictures()
         writer.write_points()
         summary = writer.write_summary()
-        for path in sorted(draft.iterdir()):
-            path.replace(folder / path.name)
+        _publish(draft, folder)
     return summary | {"folder": str(folder)}
 
 
@@ -78,6 +108,30 @@ def _draft(folder: Path) -> Iterator[Path]:
         yield draft
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+def _publish(draft: Path, folder: Path) -> None:
+    """Move the files to their place, the summary last; what only an earlier match wrote goes.
+
+    So a folder with a summary holds what it names, of one match; without one, a match was cut short.
+    """
+    earlier, names = _written_before(folder), {path.name for path in draft.iterdir()} - {_SUMMARY}
+    (folder / _SUMMARY).unlink(missing_ok=True)
+    for name in sorted(names):
+        (draft / name).replace(folder / name)
+    for name in sorted(earlier - names):
+        (folder / name).unlink(missing_ok=True)
+    (draft / _SUMMARY).replace(folder / _SUMMARY)
+
+
+def _written_before(folder: Path) -> set[str]:
+    """Return the files that an earlier match wrote, as its summary has it; only names that a match writes count."""
+    maps = {f"{each.name}.{ending}" for each in _QUANTITIES for ending in ENDINGS.values()}
+    try:
+        listed = json.loads((folder / _SUMMARY).read_text())["files"]
+        return {each["file"] for each in listed} & (maps | _PICTURES)
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return set()
 
 
 @dataclass
@@ -111,7 +165,7 @@ class _Writer:
     def write_pictures(self) -> None:
         """Write what is for the eye."""
         self._draw(self.match.wishes.product, "disparity-colour.png")
-        self._draw("confidence", "confidence-colour.png")
+        self._draw(self.match.wishes.confidence, "confidence-colour.png")
         if self.match.wishes.fill:
             write_rgb(
                 self.match.guessed.astype(np.uint8)[..., np.newaxis].repeat(3, axis=2) * 255,
@@ -141,8 +195,19 @@ class _Writer:
     def write_summary(self) -> dict[str, Any]:
         """Write and return the summary."""
         about = summary(self.match) | {"notes": self.notes, "files": self.files}
-        (self.folder / "summary.json").write_text(json.dumps(about, indent=2, allow_nan=False) + "\n")
+        (self.folder / _SUMMARY).write_text(json.dumps(about, indent=2, allow_nan=False) + "\n")
         return about
+
+
+def _basis(match: Match) -> dict[str, Any]:
+    """Return where R comes from; for a wanted error, what it did in training scenes."""
+    if not match.choice:
+        return {
+            "R_from": "from the pair's own confidences, for the density asked for" if match.wishes.density else "as set"
+        }
+    found = match.choice
+    words = f"R = {told(match.R)}: {found.words}"
+    return {"R_from": "for the error asked for", "R_basis": words, "expected_error_percent": 100 * found.error}
 
 
 def summary(match: Match) -> dict[str, Any]:
@@ -159,7 +224,7 @@ def summary(match: Match) -> dict[str, Any]:
         "reference_view": "left",
         "disparities": asdict(match.disparities) | {"estimated": list(match.scene.open_ends)},
         "R": match.R,
-        "R_from": "from the pair's own confidences, for the density asked for" if wishes.density else "as set",
+        **_basis(match),
         "wishes": asdict(wishes),
         "density_percent": 100 * match.density,
         "guessed_percent": 100 * float(match.guessed.mean()),

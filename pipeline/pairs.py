@@ -16,8 +16,10 @@ from datasets.pair import PairOptions, pair_spec
 from pipeline.api import Result, Task, run
 from pipeline.errors import UsageError
 from pipeline.pair_findings import findings
+from pipeline.steps import SPLIT
 from pipeline.tasks import Made, Watch, read_arrays
 from stages import depth as geometry
+from stages.evaluation.calibration_table import Choice, Table, choose
 
 Unit = Literal["mm", "cm", "m"]
 
@@ -29,6 +31,9 @@ class Wishes:
     Attributes:
         R: least confidence that is kept; None for the configuration's.
         density: share of the image's pixels to keep instead, the most confident, in (0, 1].
+        max_error: share of wrong pixels among the kept instead, in (0, 1), as measured on training scenes that the
+            network had not seen.
+        calibrated: take and give the confidence as the probability that was measured there.
         left_right: drop what the right view's map contradicts by more than ``tolerance`` px.
         tolerance: px.
         subpixel: move each disparity to the parabola's lowest point.
@@ -38,6 +43,8 @@ class Wishes:
 
     R: float | None = None
     density: float | None = None
+    max_error: float | None = None
+    calibrated: bool = False
     left_right: bool = False
     tolerance: float = 1.0
     subpixel: bool = False
@@ -46,8 +53,9 @@ class Wishes:
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself."""
-        if self.R is not None and self.density is not None:
-            raise UsageError("R and density both say how much to keep; give one of them")
+        given = [name for name in ("R", "density", "max_error") if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise UsageError(f"{' and '.join(given)} both say how much to keep; give one of them")
 
     @property
     def product(self) -> str:
@@ -55,9 +63,16 @@ class Wishes:
         return "filled" if self.fill else "refined" if self.left_right or self.subpixel else "semidense"
 
     @property
+    def confidence(self) -> str:
+        """The product that the confidence is taken from."""
+        return "calibrated_confidence" if self.calibrated else "confidence"
+
+    @property
     def settings(self) -> tuple[str, ...]:
         """The same as settings of the configuration."""
-        given = {"semidense.R": self.R, "semidense.density": self.density}
+        given = {f"semidense.{name}": getattr(self, name) for name in ("R", "density", "max_error")}
+        if self.calibrated:
+            given |= {"semidense.calibrated": True}
         if self.left_right:
             given |= {"refined.left_right": True, "refined.tolerance": self.tolerance}
         if self.subpixel:
@@ -93,8 +108,8 @@ class Match:
 
     @cached_property
     def confidence(self) -> NDArray[np.float32]:
-        """(y, x) float32 in [0, 1]: how sure the evaluation-Net is of ``raw``."""
-        return self._array("confidence", "confidence")
+        """(y, x) float32 in [0, 1]: how sure the evaluation-Net is of ``raw``; calibrated, if that was asked for."""
+        return self._array(self.wishes.confidence, "confidence")
 
     @cached_property
     def guessed(self) -> NDArray[np.bool_]:
@@ -156,6 +171,13 @@ class Match:
         """The least confidence that was kept."""
         return float(self._array("semidense", "R")[0])
 
+    @cached_property
+    def choice(self) -> Choice | None:
+        """What the threshold for a wanted error did in training scenes; None if no error was asked for."""
+        if self.wishes.max_error is None:
+            return None
+        return choose(Table.of(read_arrays(self.result.store, self.made("calibration").key)), self.wishes.max_error)
+
     @property
     def density(self) -> float:
         """The share of the image's pixels that have a disparity."""
@@ -185,7 +207,7 @@ class Match:
         """
         for result in (self.result, *self.others):
             for each in result.made.values():
-                if each.step.product == product and each.step.scene == self.scene.name:
+                if each.step.product == product and each.step.scene in (self.scene.name, SPLIT):
                     return each
         raise UsageError(f"{product} of {self.scene.name} was not asked for")
 
@@ -245,6 +267,13 @@ def look(task: Task, watch: Watch | None = None, workers: int | None = None) -> 
     return run(task, "survey", watch=watch, workers=workers)
 
 
+def _require_reachable(task: Task, wishes: Wishes) -> None:
+    """Refuse an error that no threshold keeps to, before anything long is made."""
+    if wishes.max_error is not None:
+        made = run(task, "calibration")
+        choose(Table.of(read_arrays(made.store, made.find("calibration").key)), wishes.max_error)
+
+
 def match_all(
     task: Task,
     wishes: Wishes,
@@ -259,6 +288,7 @@ def match_all(
     dataset = dataset.select(task.scenes) if task.scenes else dataset
     task = replace(task, dataset=dataset)
     others = [look(task, watch, workers)]
+    _require_reachable(task, wishes)
     result = run(task, wishes.product, watch=watch, scheduler=scheduler, workers=workers)
     if wishes.right_view:
         others.append(run(task, "right_disparity", watch=watch, scheduler=scheduler, workers=workers))

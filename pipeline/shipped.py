@@ -1,10 +1,11 @@
-"""The weights that come with the package: products that stand in for trained networks."""
+"""The weights that come with the package: products that stand in for trained networks and their calibration."""
 
 import hashlib
 from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 
+from stages.evaluation.calibration_declaration import CALIBRATION
 from stages.stage import Array, Inputs, Output, Stage, StageError
 
 WEIGHTS = {
@@ -15,7 +16,19 @@ WEIGHTS = {
         compute="pipeline.shipped:read_shipped_weights",
     )
     for product in ("matching_net", "evaluation_net")
+} | {
+    "calibration": Stage(
+        product="calibration",
+        inputs=(),
+        outputs=CALIBRATION.outputs,
+        compute="pipeline.shipped:read_shipped_calibration",
+    )
 }
+_HOW = {
+    "calibration": "no calibration comes with this installation: a wanted error and calibrated probabilities need one; "
+    "`make calibration DATA=DIR` makes it from Middlebury's training scenes"
+}
+"""What to do about a missing file, where it is not to train."""
 
 
 def weights_file(product: str) -> Traversable:
@@ -26,7 +39,8 @@ def weights_file(product: str) -> Traversable:
     """
     file = resources.files("stages") / "weights" / f"{product}.safetensors"
     if not file.is_file():
-        raise StageError(f"no weights for {product} come with this installation: train them with --train")
+        missing = f"no weights for {product} come with this installation: train them with --train"
+        raise StageError(_HOW.get(product, missing))
     return file
 
 
@@ -41,3 +55,10 @@ def read_shipped_weights(product: str, _: Inputs) -> dict[str, Array]:
     from stages.weights import read_weights
 
     return {"parameters": read_weights(product, weights_file(product).read_bytes())}
+
+
+def read_shipped_calibration(product: str, _: Inputs) -> dict[str, Array]:
+    """Return the shipped calibration, checked."""
+    from stages.weights.tables import read_table
+
+    return read_table(weights_file(product).read_bytes())

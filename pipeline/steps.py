@@ -7,7 +7,7 @@ share the steps in which they agree, so a sweep computes nothing twice. Nothing 
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from cache import Recipe, code_parts
@@ -17,11 +17,17 @@ from pipeline.config import Config, nearest
 from pipeline.environment import environment
 from pipeline.errors import UsageError
 from pipeline.resolution import require_trainable, resolved
+from pipeline.tiles import tiling
+from pipeline.training_split import outside, with_folds
 from stages.catalog import CATALOG, STAGES
-from stages.stage import Params, Stage
+from stages.stage import Stage
 
 PACKAGES = ("pipeline", "stages", "datasets", "cache")
 NETS = ("matching_net", "evaluation_net")
+LEARNT = tuple(shipped.WEIGHTS)
+"""Products that come with the package, unless one trains."""
+CROSS_FITTED = ("evaluation_samples", "evaluation_net")
+"""Products that a calibration makes anew for each fold, from the scenes of the others."""
 PRODUCTS = ("images", "truth", *(stage.product for stage in CATALOG))
 """The products of the dataflow, in order."""
 ALL_PRODUCTS = ("images", "truth", *STAGES)
@@ -195,31 +201,61 @@ def _identity(scene: SceneSource) -> str:
 
 @dataclass
 class _Builder:
-    """Adds the steps of one configuration to a graph."""
+    """Adds the steps of one configuration to a graph.
+
+    Attributes:
+        graph: what the steps are added to.
+        config: of these steps.
+        request: what they are for.
+        seen: the training scenes that the evaluation-Net learns from, where those are not all.
+        known: ids of the steps that it added, by product and scene.
+    """
 
     graph: Graph
     config: Config
     request: Request
+    seen: tuple[SceneSource, ...] | None = None
+    known: dict[tuple[str, int], str] = field(default_factory=dict)
 
     def product(self, product: str, scene: SceneSource | None) -> str:
         """Add the step of a product, and before it those it is made from; return its id."""
+        scene = None if _scope(product) == "split" else scene
+        asked = product, id(scene)
+        if asked not in self.known:
+            self.known[asked] = self._add_product(product, scene)
+        return self.known[asked]
+
+    def _add_product(self, product: str, scene: SceneSource | None) -> str:
         if product == "images" and scene:
             return self._add_source(sources.IMAGES, scene, scene.image_identity())
         if product == "truth" and scene:
             bounds = [scene.disparities.minimum, scene.disparities.maximum]
             return self._add_source(sources.TRUTH, scene, scene.truth_identity() | {"range": bounds})
-        if product in NETS and not self.request.train:
+        if product in LEARNT and not self.request.train:
             return self._add_shipped(product)
+        if product == "calibration":
+            return self._calibration()
         stage = STAGES[product]
-        scene = None if stage.scope == "split" else scene
         needed = getattr(self.config.section(product), "inputs", stage.inputs)
         inputs = {name: self._inputs(stage, name, scene) for name in stage.inputs if name in needed}
         return self._add_stage(stage, scene, inputs)
 
     def _inputs(self, stage: Stage, product: str, scene: SceneSource | None) -> tuple[str, ...]:
         if stage.scope == "split" and _scope(product) == "scene":
-            return tuple(self.product(product, source) for source in self.request.training)
+            scenes = self.seen if self.seen and stage.product in CROSS_FITTED else self.request.training
+            return tuple(self.product(product, source) for source in scenes)
         return (self.product(product, scene),)
+
+    def _calibration(self) -> str:
+        """Add the calibration, for which each training scene is scored by a network that learnt from other folds."""
+        scenes = self.request.training
+        config = with_folds(self.config, [scene.name for scene in scenes])
+        folds = config.calibration.fold_of_scene or ()
+        seen = {fold: outside(scenes, folds, fold) for fold in set(folds)}
+        builders = {fold: replace(self, config=config, seen=seen[fold], known={}) for fold in seen}
+        scored = tuple(builders[fold].product("confidence", scene) for scene, fold in zip(scenes, folds, strict=True))
+        inputs = {name: tuple(self.product(name, scene) for scene in scenes) for name in ("disparity", "truth")}
+        return replace(self, config=config)._add_stage(STAGES["calibration"], None, {"confidence": scored, **inputs})
 
     def _add_source(self, stage: Stage, scene: SceneSource, identity: Mapping[str, Any]) -> str:
         code = code_parts(stage.module, PACKAGES) | code_parts(scene.reader, PACKAGES)
@@ -232,7 +268,7 @@ class _Builder:
 
     def _add_stage(self, stage: Stage, scene: SceneSource | None, inputs: Mapping[str, tuple[str, ...]]) -> str:
         params = resolved(self.config.section(stage.product), scene)
-        settings = params.model_dump(mode="json") | {"tiles": _tiles(stage, params)}
+        settings = params.model_dump(mode="json") | {"tiles": tiling(stage, params)}
         return self._add(stage, scene, params, settings, inputs, code_parts(stage.module, PACKAGES))
 
     def _add(
@@ -248,8 +284,7 @@ class _Builder:
         identity = json.dumps([stage.product, name, dataset, size, settings, inputs], sort_keys=True)
         step_id = hashlib.sha256(identity.encode()).hexdigest()[:16]
         if step_id not in self.graph.steps:
-            own = self.config.semidense
-            threshold = own.R if stage.product in ("semidense", "metrics") and own.density is None else None
+            filtered = stage.product in ("semidense", "metrics") and self.config.semidense.by_R
             self.graph.steps[step_id] = Step(
                 id=step_id,
                 stage=stage,
@@ -261,28 +296,6 @@ class _Builder:
                 size=size,
                 code=dict(code),
                 environment=environment(stage),
-                R=threshold,
+                R=self.config.semidense.R if filtered else None,
             )
         return step_id
-
-
-def _tiles(stage: Stage, params: Params) -> str:
-    """Say how the image is cut: it decides the order of sums, and which files there are."""
-    if stage.tile_rows is None:
-        return "whole"
-    return f"{stage.tile_rows} rows, halo {stage.halo(params)}, {stage.border}"
-
-
-def training_scenes(dataset: Dataset) -> tuple[SceneSource, ...]:
-    """Return the scenes of a dataset that may be trained on and have a truth.
-
-    Raises:
-        UsageError: if there is none.
-    """
-    scenes = tuple(scene for scene in dataset.scenes if scene.split == "train" and scene.has_truth)
-    if not scenes:
-        raise UsageError(
-            f"{dataset.spec} has no training scene: name a dataset that has some with "
-            "--set training.dataset=middlebury:DIR"
-        )
-    return scenes

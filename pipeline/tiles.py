@@ -12,6 +12,13 @@ if TYPE_CHECKING:
     import zarr
 
 
+def tiling(stage: Stage, params: Params) -> str:
+    """Say how the image is cut: it decides the order of sums, and which files there are."""
+    if stage.tile_rows is None:
+        return "whole"
+    return f"{stage.tile_rows} rows, halo {stage.halo(params)}, {stage.border}"
+
+
 @dataclass(frozen=True)
 class Rows:
     """The rows ``start`` to ``stop`` of an image of ``height`` rows: one tile."""

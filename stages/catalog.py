@@ -6,6 +6,7 @@ when something is computed.
 
 from stages.baselines.declaration import BASELINES
 from stages.disparity_declaration import DISPARITY
+from stages.evaluation.calibration_declaration import CALIBRATED_CONFIDENCE, CALIBRATION
 from stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
 from stages.filtering import SEMIDENSE
 from stages.finishing.declaration import FILLED, REFINED, RIGHT_DISPARITY
@@ -26,6 +27,8 @@ CATALOG: tuple[Stage, ...] = (
     EVALUATION_SAMPLES,
     EVALUATION_NET,
     CONFIDENCE,
+    CALIBRATION,
+    CALIBRATED_CONFIDENCE,
     SEMIDENSE,
     REFINED,
     FILLED,

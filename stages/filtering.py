@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from stages.evaluation.calibration_maps import map_threshold
+from stages.evaluation.calibration_table import Table, choose
 from stages.stage import Arrays, Inputs, Output, Params, Stage, StageError
 
 
@@ -17,6 +19,30 @@ class SemidenseParams(Params):
     density: float | None = Field(
         default=None, gt=0, le=1, description="share of the image's pixels to keep, the most confident; replaces R"
     )
+    max_error: float | None = Field(
+        default=None,
+        gt=0,
+        lt=1,
+        description="share of wrong pixels among the kept, as measured on held-out training scenes; replaces R",
+    )
+    calibrated: bool = Field(default=False, description="R is a calibrated probability (calibrated_confidence)")
+
+    @property
+    def by_R(self) -> bool:  # noqa: N802 - the paper's name
+        """Whether R itself is what decides."""
+        return self.density is None and self.max_error is None
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The products that these settings need."""
+        confidence = "calibrated_confidence" if self.calibrated else "confidence"
+        return ("disparity", confidence, *(("calibration",) if self.max_error is not None else ()))
+
+    @model_validator(mode="after")
+    def _one_wish(self) -> "SemidenseParams":
+        if self.density is not None and self.max_error is not None:
+            raise ValueError("density and max_error both say how much to keep; give one of them")
+        return self
 
 
 def keep_confident(disparity: NDArray[Any], confidence: NDArray[Any], R: float) -> NDArray[np.float32]:
@@ -78,15 +104,26 @@ def require_share(name: str, value: float) -> None:
 
 
 def compute_semidense(params: SemidenseParams, inputs: Inputs) -> Arrays:
-    """Compute the product ``semidense``; see ``keep_confident`` and ``threshold_for``."""
-    disparity, confidence = inputs["disparity"]["disparity"], inputs["confidence"]["confidence"]
-    R = params.R if params.density is None else threshold_for(params.density, disparity, confidence)
+    """Compute the product ``semidense``; see ``keep_confident``, ``threshold_for`` and ``choose``."""
+    disparity = inputs["disparity"]["disparity"]
+    confidence = inputs["calibrated_confidence" if params.calibrated else "confidence"]["confidence"]
+    R = params.R
+    if params.density is not None:
+        R = threshold_for(params.density, disparity, confidence)
+    elif params.max_error is not None:
+        R = _threshold_of(params.max_error, params.calibrated, inputs["calibration"])
     return {"disparity": keep_confident(disparity, confidence, R), "R": np.array([R])}
+
+
+def _threshold_of(max_error: float, calibrated: bool, calibration: Arrays) -> float:
+    """Return the R for a wanted error, on the scale of the confidence that is filtered."""
+    R = choose(Table.of(calibration), max_error).R
+    return map_threshold(R, calibration["log_odds"]) if calibrated else R
 
 
 SEMIDENSE = Stage(
     product="semidense",
-    inputs=("disparity", "confidence"),
+    inputs=("disparity", "confidence", "calibration", "calibrated_confidence"),
     outputs=(
         Output("disparity", ("y", "x"), "float32", "px", "disparity of the left view; NaN: confidence below R"),
         Output("R", ("all",), "float64", "1", "least confidence that was kept"),
@@ -95,4 +132,4 @@ SEMIDENSE = Stage(
     params=SemidenseParams,
 )
 """The filtered disparity. A sweep over R makes only this product and what is below it again. Not tiled: a density is
-that of the whole map."""
+that of the whole map. Only those inputs are made that the settings need."""

@@ -5,7 +5,8 @@ from stages.catalog import STAGES
 
 def _above(product: str) -> set[str]:
     stage = STAGES.get(product)
-    return {product}.union(*(_above(each) for each in stage.inputs)) if stage else {product}
+    needed = getattr(stage.params(), "inputs", stage.inputs) if stage else ()
+    return {product}.union(*(_above(each) for each in needed))
 
 
 PATH = _above("metrics")

@@ -84,7 +84,7 @@ def graph(found: Gathered) -> Html:
 def _drawn_inputs(product: str, counts: Mapping[str, Done]) -> list[str]:
     """Return the inputs that get an arrow: those between neighbours; the long ones go without saying."""
     x, y = _PLACES[product]
-    inputs = STAGES[product].inputs if product in STAGES else ()
+    inputs = [name for name in STAGES[product].inputs if name in _PLACES] if product in STAGES else []
     if product.endswith("_net") and f"{product.removesuffix('_net')}_samples" not in counts:
         return []
     return [

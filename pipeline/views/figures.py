@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from pipeline.config import nearest
 from pipeline.errors import UsageError
+from pipeline.views.calibrations import draw_calibration
 from pipeline.views.colours import confidence_rgb, disparity_rgb, disparity_span
 from pipeline.views.costs import draw_costs
 from pipeline.views.curves import error_curve_figure
@@ -44,6 +45,8 @@ _DRAW: Mapping[str, Callable[..., None]] = {
     "evaluation_samples": draw_evaluation_samples,
     "evaluation_net": draw_network,
     "confidence": draw_confidence,
+    "calibration": draw_calibration,
+    "calibrated_confidence": draw_confidence,
     "semidense": draw_disparity,
     "right_disparity": draw_disparity,
     "refined": draw_disparity,
@@ -63,7 +66,8 @@ _TOLD = {
     "evaluation_samples": ("form", "samples", "tolerance"),
     "evaluation_net": ("steps",),
     "confidence": ("precision",),
-    "semidense": ("R", "density"),
+    "calibration": ("folds",),
+    "semidense": ("R", "density", "max_error"),
     "refined": ("left_right", "subpixel"),
 }
 """The settings that a title tells."""
@@ -118,5 +122,5 @@ def _told(product: str, params: Mapping[str, Any]) -> str:
     if "shipped" in params:
         return "shipped weights"
     names = [name for name in _TOLD.get(product, ()) if params.get(name) is not None]
-    names = [name for name in names if not (name == "R" and "density" in names)]
+    names = [name for name in names if not (name == "R" and {"density", "max_error"} & set(names))]
     return ", ".join(f"{name.replace('_', ' ')} {_SPOKEN.get(str(params[name]), params[name])}" for name in names)

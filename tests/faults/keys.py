@@ -35,27 +35,30 @@ def changed_ingredients(scale: float) -> Tally:
 
 
 def keys_of(graph: Graph) -> dict[str, str]:
-    """Return a stand-in for each product's key by product: its recipe, with its inputs' stand-ins for digests."""
+    """Return a stand-in for each product's key by product: its recipe, with its inputs' stand-ins for digests.
+
+    Of several steps of a product the first counts: the others are of the folds of a calibration.
+    """
     found: dict[str, str] = {}
     for step in graph.steps.values():
         found[step.id] = step.recipe(found).key
-    return {step.product: found[step.id] for step in graph.steps.values()}
+    return {step.product: found[step.id] for step in reversed(graph.steps.values())}
 
 
 def _request(config: Config, train: bool) -> Request:
     from datasets import open_dataset
 
-    dataset = open_dataset("synthetic:train=1,test=1,height=64,width=80,disparities=8")
+    dataset = open_dataset("synthetic:train=2,test=1,height=64,width=80,disparities=8")
     training = tuple(scene for scene in dataset.scenes if scene.split == "train") if train else ()
     return Request(dataset.select(["test-0"]), {"": config}, "metrics", train, training)
 
 
 @cache
 def below(product: str) -> frozenset[str]:
-    """Return a product and all that is made from it, as the stages declare."""
+    """Return a product and all that is made from it, as the stages declare for the default settings."""
     found = {product}
     for stage in STAGES.values():
-        if found & set(stage.inputs):
+        if found & set(getattr(stage.params(), "inputs", stage.inputs)):
             found.add(stage.product)
     return frozenset(found)
 
@@ -109,7 +112,7 @@ def _others(field: Any, value: object) -> Iterator[object]:  # noqa: ANN401
         yield from (value + 2, value + 1, value - 1, value - 2, value / 2, value * 2)
     elif isinstance(value, (tuple, list)):
         yield from (",".join(map(str, value[:-1])), ",".join(map(str, value[:1])))
-    yield from (1, 2, 3, 0.5, "x")
+    yield from (1, 2, 3, 0.5, "x", "[0, 1]")
 
 
 def _input_bytes(tally: Tally, stride: int) -> None:

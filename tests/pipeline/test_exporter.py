@@ -19,7 +19,7 @@ from pipeline.errors import UsageError
 from pipeline.exporter import COLUMNS, export, writable_folder, write_rows
 from pipeline.plan import Plan
 from pipeline.sources import IMAGES, TRUTH
-from pipeline.steps import SPLIT, Step
+from pipeline.steps import NETS, SPLIT, Step
 from pipeline.tasks import Made
 from pipeline.views.colours import confidence_rgb, disparity_rgb
 from stages.catalog import STAGES
@@ -83,7 +83,7 @@ class Run:
     def nets(self) -> tuple[Made, Made]:
         """Add shipped weights."""
         arrays = {"parameters": np.zeros(3, np.float32)}
-        return tuple(self.add(name, SPLIT, arrays, stage=shipped.WEIGHTS[name]) for name in shipped.WEIGHTS)
+        return tuple(self.add(name, SPLIT, arrays, stage=shipped.WEIGHTS[name]) for name in NETS)
 
     def result(self) -> Result:
         return Result(Plan((), tuple(self.targets)), self.made, self.store, self.rows)

@@ -224,6 +224,29 @@ def test_a_folder_that_cannot_be_written_gets_nothing(
     assert list((tmp_path / "out").iterdir()) == []
 
 
+def test_a_second_match_leaves_nothing_of_the_first(folder: Path, found: Match, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    save(found, out)
+    (out / "notes.txt").write_text("mine")
+    summary = json.loads((out / "summary.json").read_text())
+    summary["files"] += [{"file": "notes.txt"}, {"file": "../folder"}]
+    (out / "summary.json").write_text(json.dumps(summary))
+    plain = match(folder / "left.png", folder / "right.png", d_min=0, d_max=8, cache=folder / "cache")
+    about = save(plain, out, ["npy"])
+    told = {each["file"] for each in about["files"]} | {"summary.json"}
+    assert {path.name for path in out.iterdir()} == told | {"notes.txt"}, "depth of another match would deceive"
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"files": 3}', '{"files": [{}]}', "\x00", '{"files": [{"file": []}]}']
+)
+def test_a_summary_of_something_else_is_replaced(found: Match, tmp_path: Path, text: str) -> None:
+    (tmp_path / "summary.json").write_text(text)
+    (tmp_path / "points.ply").write_text("mine")
+    save(found, tmp_path, ["npy"])
+    assert json.loads((tmp_path / "summary.json").read_text())["pair"] == found.scene.name
+
+
 def test_several_pairs_get_a_folder_each(folder: Path, found: Match, tmp_path: Path) -> None:
     (folder / "pairs.csv").write_text("left.png,right.png\nright.png,left.png\n")
     spec = f"pair:{folder}/pairs.csv,d_min=-8,d_max=8"

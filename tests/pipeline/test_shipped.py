@@ -7,6 +7,7 @@ import pytest
 
 from pipeline import api, shipped
 from pipeline.api import Result, Task
+from pipeline.steps import NETS
 from stages.stage import StageError
 from tests.tiny import TEST_ONLY
 
@@ -31,7 +32,7 @@ def test_the_digest_is_that_of_the_file(weights: Path) -> None:
     assert shipped.weights_digest("matching_net") == hashlib.sha256(data).hexdigest()
 
 
-@pytest.mark.parametrize("product", shipped.WEIGHTS)
+@pytest.mark.parametrize("product", NETS)
 def test_what_comes_back_is_what_was_trained(weights: Path, trained: Result, product: str) -> None:
     parameters = shipped.read_shipped_weights(product, {})["parameters"]
     assert np.array_equal(parameters, trained.open(product)["parameters"].values)

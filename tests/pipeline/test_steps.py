@@ -9,7 +9,8 @@ from datasets import Dataset, SceneSource, open_dataset
 from pipeline import shipped
 from pipeline.config import Config
 from pipeline.errors import UsageError
-from pipeline.steps import PRODUCTS, SPLIT, Graph, Request, Step, build, training_scenes
+from pipeline.steps import PRODUCTS, SPLIT, Graph, Request, Step, build
+from pipeline.training_split import training_scenes
 from stages.stage import StageError
 from tests.tiny import PATH
 

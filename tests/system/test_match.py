@@ -91,6 +91,7 @@ def test_a_bad_picture_is_one_line_and_leaves_nothing(
         pytest.param(["{}/im0.png", "{}/im1.png", "--density", "much"], ["such as 80%"], id="no share"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--density", "120%"], ["such as 80%"], id="more than all"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--R", "0.5", "--density", "50%"], ["one of them"], id="both"),
+        pytest.param(["{}/im0.png", "{}/im1.png", "--max-error", "2", "--R", "1"], ["such as 2%"], id="200 % error"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--format", "jpeg"], ["no format 'jpeg'"], id="no such format"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--calib", "{}/im0.png"], ["no plain text"], id="a picture as calib"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--calib", "{}/none"], ["none"], id="no calibration there"),
@@ -113,6 +114,17 @@ def refused(invoke: Invoke, tmp_path: Path, arguments: list[Any], words: list[st
     assert not (tmp_path / "out").exists()
     assert not list((tmp_path / "cache").glob("records/*/*"))
     assert not list((tmp_path / "cache").glob("drafts/*"))
+
+
+def test_a_place_that_cannot_be_written_is_told_before_anything_is_made(
+    invoke: Invoke, pair: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("mine")
+    for place in (tmp_path / "file", tmp_path / "file" / "below"):
+        ran = invoke("match", pair / "im0.png", pair / "im1.png", "-o", place, "--cache", tmp_path / "cache")
+        assert (ran.code, ran.out) == (2, "")
+        assert ran.err == f"pipeline: {place}: cannot be written ({tmp_path / 'file'} is a file); name another place\n"
+    assert not (tmp_path / "cache").exists()
 
 
 def oriented(view: Image.Image) -> Image.Image:

@@ -5,6 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 
+from stages.evaluation.calibration_declaration import BINS
+from stages.evaluation.calibration_table import EDGES, probability
 from stages.metrics.stage import FIGURES, THRESHOLDS
 
 N = np.nan
@@ -94,6 +96,20 @@ def confidence() -> xr.Dataset:
     return xr.Dataset({"confidence": (("y", "x"), np.linspace(0, 1, 24, dtype=np.float32).reshape(4, 6))})
 
 
+def calibration() -> xr.Dataset:
+    pixels = 200 * np.ones((3, BINS), np.int64)
+    wrong = np.round(pixels * (1 - probability((EDGES[1:] + EDGES[:-1]) / 2))).astype(np.int64)
+    return xr.Dataset(
+        {
+            "right": (("scene", "bin"), pixels - wrong),
+            "wrong": (("scene", "bin"), wrong),
+            "score": ("map", [0.1234, 0.1112, 0.1199]),
+            "log_odds": ("edge", 0.8 * EDGES - 0.1),
+            "tolerance": ("all", [1.0]),
+        }
+    )
+
+
 def metrics() -> xr.Dataset:
     figures = {name: (("mask", "threshold"), np.full((2, 4), 12.5)) for name in FIGURES}
     figures["pixels"] = (("mask", "threshold"), np.full((2, 4), 1234))
@@ -125,6 +141,8 @@ PRODUCTS: dict[str, Callable[[], xr.Dataset]] = {
     "evaluation_samples": evaluation_samples,
     "evaluation_net": shipped,
     "confidence": confidence,
+    "calibration": calibration,
+    "calibrated_confidence": confidence,
     "semidense": disparity,
     "right_disparity": disparity,
     "refined": disparity,

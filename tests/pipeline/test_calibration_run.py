@@ -1,0 +1,217 @@
+"""A calibration from the tiny training split, and the wishes that rest on it."""
+
+import json
+from collections.abc import Callable, Iterator
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+from safetensors import safe_open
+
+from pipeline import shipped
+from pipeline.api import Result, Task, run
+from pipeline.errors import StageRefused, UsageError
+from pipeline.exporter import export
+from pipeline.pairs import Wishes, match, match_all
+from pipeline.reporting.gathered import gather
+from pipeline.reporting.graph import graph
+from stages.evaluation.calibration_declaration import BINS
+from stages.evaluation.calibration_table import EDGES, Table, choose, probability
+from stages.stage import StageError
+from stages.weights.tables import read_table, save_table
+from tests.tiny import SETTINGS, SPEC, TEST_ONLY
+
+
+@pytest.fixture(scope="module")
+def calibrated(trained: Result, tmp_path_factory: pytest.TempPathFactory) -> Result:
+    """The calibration of the tiny training split, in a copy of the session's cache."""
+    import shutil
+
+    cache = shutil.copytree(trained.store.root, tmp_path_factory.mktemp("calibrated") / "cache")
+    return run(Task(SPEC, settings=SETTINGS, train=True, cache=cache), "calibration")
+
+
+def test_each_scene_is_scored_by_a_network_that_has_not_seen_it(calibrated: Result) -> None:
+    steps = {made.step.id: made.step for made in calibrated.made.values()}
+    calibration = calibrated.find("calibration").step
+    assert calibration.settings["fold_of_scene"] == [0, 1]
+    for confidence in calibration.inputs["confidence"]:
+        net = steps[steps[confidence].inputs["evaluation_net"][0]]
+        samples = steps[net.inputs["evaluation_samples"][0]]
+        seen = {steps[each].scene for step in (net, samples) for each in step.inputs["disparity"]}
+        assert seen == {"train-0", "train-1"} - {steps[confidence].scene}
+        assert net.settings["steps"] == 1, "half of those for both scenes"
+
+
+def test_the_volumes_of_the_training_run_are_reused(calibrated: Result) -> None:
+    made = {each.step.product for each in calibrated.made.values() if not each.reused}
+    assert made == {"evaluation_samples", "evaluation_net", "confidence", "calibration"}
+
+
+def test_every_pixel_of_known_truth_is_counted(calibrated: Result) -> None:
+    table = calibrated.open("calibration")
+    for row, scene in enumerate(("train-0", "train-1")):
+        truth = calibrated.open("truth", scene)["disparity"].values
+        assert int((table["right"] + table["wrong"]).values[row].sum()) == np.isfinite(truth).sum()
+
+
+def test_the_file_holds_the_table_and_how_it_was_made(calibrated: Result, tmp_path: Path) -> None:
+    written = export(calibrated, tmp_path)
+    names = [path.name for path in written]
+    assert "calibration.safetensors" in names
+    assert not [name for name in names if name.startswith("evaluation_net")], "a fold's network is nobody's weights"
+    read = read_table((tmp_path / "calibration.safetensors").read_bytes())
+    assert np.array_equal(read["right"], calibrated.open("calibration")["right"].values)
+    with safe_open(tmp_path / "calibration.safetensors", "numpy") as file:
+        configuration = json.loads(file.metadata()["configuration"])
+    assert configuration["evaluation_net"]["steps"] == 1
+    assert configuration["calibration"]["folds"] == 2
+
+
+def test_the_steps_are_a_setting(own_task: Task) -> None:
+    from dataclasses import replace
+
+    from pipeline.api import status
+
+    plan = status(replace(own_task, settings=[*own_task.settings, "calibration.steps=7"]), "calibration")
+    assert {each.step.settings["steps"] for each in plan.steps if each.step.product == "evaluation_net"} == {7}
+
+
+def table_file(folder: Path, wrong: int) -> None:
+    """Ship a table in which pixels of a confidence above 0.5 are wrong once in ten, above 0.8 ``wrong`` in 100."""
+    p = probability((EDGES[1:] + EDGES[:-1]) / 2)
+    bad = np.where(p < 0.5, 50, np.where(p < 0.8, 10, wrong)).astype(np.int64)
+    counts = np.tile(bad, (3, 1))
+    arrays = {
+        "right": 100 - counts,
+        "wrong": counts,
+        "score": np.array([0.2, 0.1, 0.3]),
+        "log_odds": 0.5 * EDGES,
+        "tolerance": np.array([1.0]),
+    }
+    (folder / "calibration.safetensors").write_bytes(save_table(arrays, {}))
+    shipped.weights_digest.cache_clear()
+
+
+@pytest.fixture
+def table(weights: Path) -> Iterator[Path]:
+    """Weights with a table beside them."""
+    table_file(weights, wrong=1)
+    yield weights
+    shipped.weights_digest.cache_clear()
+
+
+def test_a_wanted_error_decides_the_threshold_of_a_run(table: Path, tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    result = run(Task(TEST_ONLY, settings=["semidense.max_error=0.02"], cache=cache), "metrics")
+    expected = choose(Table.of(read_table((table / "calibration.safetensors").read_bytes())), 0.02)
+    kept = result.open("semidense")
+    assert kept["R"].values.tolist() == [expected.R]
+    confidence = result.open("confidence")["confidence"].values
+    assert np.array_equal(np.isfinite(kept["disparity"].values), confidence >= np.float32(expected.R))
+    assert all("R" not in row for row in result.metrics), "R is the table's, not the user's"
+    drawn = graph(gather(Task(TEST_ONLY, settings=["semidense.max_error=0.02"], cache=cache)))
+    assert "semidense" in drawn
+
+
+def test_by_default_neither_table_nor_calibrated_confidence_is_made(table: Path, tmp_path: Path) -> None:
+    result = run(Task(TEST_ONLY, cache=tmp_path / "cache"), "metrics")
+    assert not {"calibration", "calibrated_confidence"} & {each.step.product for each in result.made.values()}
+
+
+def test_calibrated_and_plain_keep_the_same_pixels_for_a_wanted_error(table: Path, tmp_path: Path) -> None:
+    task = Task(TEST_ONLY, cache=tmp_path / "cache")
+    plain, calibrated = (match_all(task, Wishes(max_error=0.05, calibrated=each))[0] for each in (False, True))
+    assert np.array_equal(plain.disparity, calibrated.disparity, equal_nan=True)
+    assert not np.array_equal(plain.confidence, calibrated.confidence)
+    assert calibrated.made("calibrated_confidence").step.scene == calibrated.scene.name
+
+
+def test_the_basis_is_in_the_summary(table: Path, tmp_path: Path) -> None:
+    from pipeline.match_files import save
+
+    found = match_all(Task(TEST_ONLY, cache=tmp_path / "cache"), Wishes(max_error=0.02))[0]
+    about = save(found, tmp_path / "out", ["npy"])
+    assert found.choice is not None
+    assert about["expected_error_percent"] == 100 * found.choice.error <= 2
+    assert about["wishes"]["max_error"] == 0.02
+    assert about["R_basis"].startswith(f"R = {found.R:.3f}: ")
+    assert "wrong by more than 1 px in 3 training scenes that the network had not seen" in about["R_basis"]
+
+
+def test_an_error_that_no_threshold_reaches_is_refused_before_anything_long(table: Path, tmp_path: Path) -> None:
+    with pytest.raises(StageError, match=r"no R keeps the error to 0.1 %: the least .* is 1 %"):
+        match_all(Task(TEST_ONLY, cache=tmp_path / "cache"), Wishes(max_error=0.001))
+    with pytest.raises(StageRefused, match=r"no R keeps the error to 0.1 %"):
+        run(Task(TEST_ONLY, settings=["semidense.max_error=0.001"], cache=tmp_path / "cache"), "semidense")
+
+
+def test_without_a_table_it_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pipeline.shipped.resources.files", lambda _: tmp_path)
+    shipped.weights_digest.cache_clear()
+    with pytest.raises(StageError, match=r"no calibration comes with this installation: .*`make calibration DATA=DIR`"):
+        shipped.weights_digest("calibration")
+
+
+@pytest.mark.parametrize(
+    ("wishes", "message"),
+    [
+        pytest.param({"R": 0.5, "max_error": 0.1}, "R and max_error both say", id="R and an error"),
+        pytest.param({"density": 0.5, "max_error": 0.1}, "density and max_error both say", id="density and an error"),
+        pytest.param({"max_error": 0.0}, "semidense.max_error", id="no error at all"),
+        pytest.param({"max_error": 1.0}, "semidense.max_error", id="any error"),
+    ],
+)
+def test_wishes_that_cannot_be_are_refused(table: Path, tmp_path: Path, wishes: dict[str, float], message: str) -> None:
+    view = np.zeros((64, 80), np.uint8)
+    with pytest.raises(UsageError, match=message):
+        match(view, view, d_min=0, d_max=4, cache=tmp_path / "cache", **wishes)
+
+
+def test_the_settings_refuse_two_wishes() -> None:
+    with pytest.raises(UsageError, match="give one of them"):
+        run(Task(TEST_ONLY, settings=["semidense.max_error=0.1", "semidense.density=0.5"]), "semidense")
+
+
+def test_the_command_says_what_the_threshold_rests_on(
+    table: Path, tmp_path: Path, make_pair: Callable[[Path], Path], invoke: Callable[..., object]
+) -> None:
+    pair = make_pair(tmp_path / "pair")
+    arguments = ["match", pair / "im0.png", pair / "im1.png", "--max-disp", 4, "--cache", tmp_path / "cache"]
+    ran = invoke(*arguments, "--max-error", "5%", "-o", tmp_path / "out", "--format", "npy")
+    assert ran.code == 0, ran.err
+    assert "training scenes that the network had not seen" in ran.out
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["R_from"] == "for the error asked for"
+    refused = invoke(*arguments, "--max-error", "0.1%", "-o", tmp_path / "none")
+    assert (refused.code, refused.err.count("\n")) == (2, 1)
+    assert not (tmp_path / "none").exists()
+    unclear = invoke(*arguments, "--max-error", "small")
+    assert (unclear.code, "such as 2% or 0.02" in unclear.err) == (2, True)
+
+
+def test_the_bins_are_wide_enough_for_both_ends() -> None:
+    assert probability(EDGES[[0, -1]]).round(5).tolist() == [5e-05, 0.99995]
+    assert EDGES.size == BINS + 1
+
+
+SHIPPED = {
+    name: resources.files("stages") / "weights" / f"{name}.safetensors" for name in ("evaluation_net", "calibration")
+}
+
+
+@pytest.mark.skipif(
+    not all(file.is_file() for file in SHIPPED.values()),
+    reason="stages/weights has no table: make calibration DATA=DIR",
+)
+def test_the_shipped_table_was_made_for_the_shipped_networks() -> None:
+    about = {}
+    for name, file in SHIPPED.items():
+        with safe_open(str(file), "numpy") as opened:
+            about[name] = {key: json.loads(text) for key, text in opened.metadata().items() if key != "product"}
+    net, table = about["evaluation_net"], about["calibration"]
+    assert table["training_data"]["disparity"] == net["training_data"]["disparity"], "the same raw maps"
+    for section in ("evaluation_samples", "evaluation_net"):
+        settings = [{**each["configuration"][section], "steps": None, "precision": None} for each in (net, table)]
+        assert settings[0] == settings[1]
+    assert len(read_table(SHIPPED["calibration"].read_bytes())["right"]) == len(net["training_data"]["disparity"])
