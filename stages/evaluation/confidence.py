@@ -1,10 +1,11 @@
-"""The confidence of each pixel of a raw disparity map: the evaluation-Net at every pixel at once."""
+"""The confidence of each pixel of a raw map: the evaluation-Net at every pixel at once, and the map's agreement."""
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
 from stages.allocator import keep_freed_memory
+from stages.evaluation.agreement import padded_agreement
 from stages.evaluation.declaration import RADIUS, ConfidenceParams
 from stages.evaluation.layers import evaluation_layers
 from stages.evaluation.net import EvaluationNet
@@ -17,7 +18,7 @@ from stages.training import one_thread
 def confidence(
     net: EvaluationNet, layers: NDArray[np.float32], precision: Precision = "float32", flipped: bool = False
 ) -> NDArray[np.float32]:
-    """Return the probability that each disparity is right.
+    """Return the probability that each disparity is right, as the evaluation-Net sees it.
 
     Args:
         net: the evaluation-Net.
@@ -30,13 +31,13 @@ def confidence(
     """
     require_shape("layers", layers, 3)
     margin = ((0, 0), (RADIUS, RADIUS), (RADIUS, RADIUS))
-    return padded_confidence(net, np.pad(layers, margin, mode="edge"), precision, flipped)
+    return sigmoid(padded_log_odds(net, np.pad(layers, margin, mode="edge"), precision, flipped))
 
 
-def padded_confidence(
+def padded_log_odds(
     net: EvaluationNet, layers: NDArray[np.float32], precision: Precision = "float32", flipped: bool = False
 ) -> NDArray[np.float32]:
-    """As ``confidence``, for layers (layer, y + 100, x + 100) that bring 50 px of context on every side."""
+    """Return the log-odds of ``confidence``, of layers (layer, y + 100, x + 100) with 50 px of context all round."""
     keep_freed_memory()
     one_thread()
     with torch.inference_mode(), autocast(precision):
@@ -45,8 +46,28 @@ def padded_confidence(
         if flipped:
             other = net.dense(maps.flip(2).contiguous(memory_format=torch.channels_last))
             log_odds = (log_odds + other.flip(0)) / 2
-    result: NDArray[np.float32] = torch.sigmoid(log_odds).numpy()
+    result: NDArray[np.float32] = log_odds.numpy()
     return result
+
+
+def sigmoid(log_odds: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return probabilities of log-odds, float32 as they are."""
+    result: NDArray[np.float32] = torch.sigmoid(torch.from_numpy(log_odds)).numpy()
+    return result
+
+
+def weigh_in(log_odds: NDArray[np.float32], agreement: NDArray[np.float32], weight: float) -> NDArray[np.float32]:
+    """Return the confidence: the odds of the evaluation-Net, times the agreement to the power of ``weight``.
+
+    Args:
+        log_odds: float32 (y, x) of the evaluation-Net.
+        agreement: float32 (y, x) in (0, 1] of the raw map.
+        weight: 0 or more; at 0 the confidence is the evaluation-Net's probability, bit for bit.
+
+    >>> weigh_in(np.float32([0, 0]), np.float32([1, 0.5]), weight=1.0).tolist()
+    [0.5, 0.3333333432674408]
+    """
+    return sigmoid(log_odds + np.float32(weight) * np.log(agreement))
 
 
 def compute_confidence(params: ConfidenceParams, inputs: Inputs) -> dict[str, NDArray[np.float32]]:
@@ -54,6 +75,13 @@ def compute_confidence(params: ConfidenceParams, inputs: Inputs) -> dict[str, ND
     net = EvaluationNet()
     from_vector(net, inputs["evaluation_net"]["parameters"])
     images: dict[str, Array] = inputs["images"]
-    layers = evaluation_layers(images["left"], images["moments"][0], inputs["disparity"]["disparity"])
+    disparity = inputs["disparity"]["disparity"]
+    layers = evaluation_layers(images["left"], images["moments"][0], disparity)
     net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-    return {"confidence": padded_confidence(net, layers, params.precision, params.flipped)}
+    log_odds = padded_log_odds(net, layers, params.precision, params.flipped)
+    agreeing = padded_agreement(disparity, params.window)
+    return {
+        "confidence": weigh_in(log_odds, agreeing, params.agreement),
+        "network": sigmoid(log_odds),
+        "agreement": agreeing,
+    }

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from stages.precision import Precision
 from stages.schedule import SHARDS, Schedule
@@ -43,10 +43,21 @@ class EvaluationNetParams(Schedule):
 
 
 class ConfidenceParams(Params):
-    """How the evaluation-Net runs."""
+    """How the evaluation-Net runs, and how much the map's agreement weighs beside it."""
 
+    agreement: float = Field(
+        3.0, ge=0, le=100, description="power of the map's agreement by which the odds are multiplied; 0 is the paper"
+    )
+    window: int = Field(17, ge=1, le=PATCH, description="side of the window of the agreement, px, odd")
     flipped: bool = Field(False, description="look upside down too, and take the mean; twice the time")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
+
+    @field_validator("window")
+    @classmethod
+    def _odd(cls, window: int) -> int:
+        if window % 2 == 0:
+            raise ValueError(f"{window} is even: a window has a middle pixel, so its side is odd")
+        return window
 
 
 EVALUATION_SAMPLES = Stage(
@@ -80,7 +91,11 @@ EVALUATION_NET = Stage(
 CONFIDENCE = Stage(
     product="confidence",
     inputs=("images", "disparity", "evaluation_net"),
-    outputs=(Output("confidence", ("y", "x"), "float32", "1", "probability that the disparity is right, in [0, 1]"),),
+    outputs=(
+        Output("confidence", ("y", "x"), "float32", "1", "how sure it is that the disparity is right, in [0, 1]"),
+        Output("network", ("y", "x"), "float32", "1", "probability by the evaluation-Net alone, in [0, 1]"),
+        Output("agreement", ("y", "x"), "float32", "1", "share of the window with the same disparity, in (0, 1]"),
+    ),
     compute="stages.evaluation.confidence:compute_confidence",
     params=ConfidenceParams,
     tile_rows=256,

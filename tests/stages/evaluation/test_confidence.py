@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
-from stages.evaluation.confidence import confidence, padded_confidence
+from stages.evaluation.agreement import agreement
+from stages.evaluation.confidence import confidence, padded_log_odds, sigmoid, weigh_in
 from stages.evaluation.declaration import CONFIDENCE, ConfidenceParams
 from stages.evaluation.layers import evaluation_layers
 from stages.parameters import to_vector
@@ -19,7 +21,7 @@ DIMS = {
 def products(height: int = 11, width: int = 8) -> dict[str, dict[str, np.ndarray]]:
     given = scene(height=height, width=width)
     return {
-        "images": given["images"],
+        "images": {name: given["images"][name] for name in ("left", "moments")},
         "disparity": given["disparity"],
         "evaluation_net": {"parameters": to_vector(random_net())},
     }
@@ -34,7 +36,7 @@ def test_equals_the_patches_with_the_edge_repeated() -> None:
     made = confidence(net, layers)
     assert made.shape == (5, 8) and made.dtype == np.float32
     assert np.abs(made - expected).max() <= 1e-4
-    assert np.array_equal(padded_confidence(net, padded), made)
+    assert np.array_equal(sigmoid(padded_log_odds(net, padded)), made)
 
 
 def test_is_a_probability_and_deterministic() -> None:
@@ -80,9 +82,11 @@ def test_tiles_equal_the_whole(rows: int, flipped: bool) -> None:
     """Up to the order of the sums in a convolution, which may depend on the size of its input."""
     params, given = ConfidenceParams(precision="float32", flipped=flipped), products(height=11 if rows > 1 else 4)
     one, other = tiled(CONFIDENCE, params, given, DIMS, rows), whole(CONFIDENCE, params, given, DIMS)
-    assert one["confidence"].dtype == other["confidence"].dtype == np.float32
-    assert np.abs(one["confidence"] - other["confidence"]).max() <= 1e-5
-    assert np.ptp(other["confidence"]) > 0.01
+    for name in ("confidence", "network"):
+        assert one[name].dtype == other[name].dtype == np.float32
+        assert np.abs(one[name] - other[name]).max() <= 1e-5
+        assert np.ptp(other[name]) > 0.01
+    assert np.array_equal(one["agreement"], other["agreement"])
 
 
 def test_the_stage_is_the_network_on_the_layers_of_the_left_view() -> None:
@@ -91,7 +95,29 @@ def test_the_stage_is_the_network_on_the_layers_of_the_left_view() -> None:
     layers = evaluation_layers(left, moments[0], given["disparity"]["disparity"])
     made = whole(CONFIDENCE, ConfidenceParams(precision="float32"), given, DIMS)
     assert list(made) == [output.name for output in CONFIDENCE.outputs]
-    assert np.abs(made["confidence"] - confidence(random_net(), layers)).max() <= 1e-5
+    assert np.abs(made["network"] - confidence(random_net(), layers)).max() <= 1e-5
+    assert np.array_equal(made["agreement"], agreement(given["disparity"]["disparity"], 17))
+
+
+def test_agreement_weighs_in_by_its_power_and_not_at_all_in_the_paper_s_form() -> None:
+    plain, weighed = (
+        whole(CONFIDENCE, ConfidenceParams(precision="float32", agreement=weight, window=3), products(), DIMS)
+        for weight in (0.0, 2.0)
+    )
+    assert np.array_equal(plain["confidence"], plain["network"])
+    odds = plain["network"] / (1 - plain["network"]) * plain["agreement"].astype(np.float64) ** 2
+    assert np.abs(weighed["confidence"] - odds / (1 + odds)).max() <= 1e-5
+    assert (weighed["confidence"] <= weighed["network"]).all()
+
+
+def test_without_any_agreement_little_confidence_is_left() -> None:
+    assert weigh_in(np.float32([20.0]), np.float32([1 / 289]), 6.0)[0] < 1e-5
+
+
+@pytest.mark.parametrize("window", [pytest.param(16, id="even"), pytest.param(103, id="beyond the patch")])
+def test_the_window_has_a_middle_and_fits_the_patch(window: int) -> None:
+    with pytest.raises(ValidationError, match=r"window"):
+        ConfidenceParams(window=window)
 
 
 def test_refuses_layers_without_an_axis_of_layers() -> None:
