@@ -13,8 +13,7 @@ _WIDER = 20
 """Bins of the table in one point of the diagram."""
 _FEWEST = 50
 """Pixels that a point must stand for."""
-_MARKED = (0.5, 0.8, 0.9, 0.95, 0.98, 0.99)
-_NEAR = 0.02
+_MARKED = (0.5, 0.8, 0.9, 0.95, 0.99, 0.999)
 
 
 def draw_calibration(figure: Figure, dataset: xr.Dataset) -> None:
@@ -49,12 +48,14 @@ def _draw_choices(axes: Axes, table: Table) -> None:
     found = choices(table)
     axes.plot([100 * each.kept for each in found], [100 * each.error for each in found], color=BLUE)
     for R in _MARKED:
-        near = min(found, key=lambda each: abs(each.R - R), default=None)
-        if near and abs(near.R - R) < _NEAR:
+        near = next((each for each in found if each.R >= R), None)
+        if near:
             place = 100 * near.kept, 100 * near.error
             axes.plot(*place, color=BLUE, marker="o")
-            axes.annotate(f"R = {R:g}", place, xytext=(6, -12), textcoords="offset points")
+            axes.annotate(f"R = {R:g}", place, xytext=(-8, 4), textcoords="offset points", ha="right")
     scenes = f"mean of {len(table.right)} scenes"
     axes.set(xlabel=f"kept (% of the pixels), {scenes}", ylabel=f"wrong (% of the kept), {scenes}", xlim=(0, 100))
+    axes.set_yscale("symlog", linthresh=0.1)
     axes.set_ylim(bottom=0)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.grid(alpha=0.3)

@@ -124,7 +124,12 @@ def test_explain_as_json_is_the_recipe(invoke: Invoke, there: list[str], trained
     assert found["key"] == trained.find("costvolume", "test-0").key
     assert set(found["recipe"]) == {"stage", "code", "params", "inputs", "environment", "version"}
     assert found["recipe"]["inputs"]["matching_net"] == trained.find("matching_net").digest
-    assert found["extras"]["configuration"]["semidense"] == {"R": 0.9, "density": None}
+    assert found["extras"]["configuration"]["semidense"] == {
+        "R": 0.9,
+        "density": None,
+        "max_error": None,
+        "calibrated": False,
+    }
 
 
 @pytest.mark.parametrize("product", ["images", "channels", "costvolume", "disparity", "confidence", "semidense"])

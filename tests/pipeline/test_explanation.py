@@ -12,7 +12,8 @@ from tests.pipeline.toy import chain
 def test_a_hit_is_explained_by_its_entry(trained: Result, trained_task: Task) -> None:
     found = explanation(explain(trained_task, "semidense"), trained.store)
     assert found["state"] == "hit"
-    assert found["recipe"]["params"] == {"R": 0.9, "density": None, "tiles": "whole"}
+    settings = {"R": 0.9, "density": None, "max_error": None, "calibrated": False}
+    assert found["recipe"]["params"] == settings | {"tiles": "whole"}
     assert found["digest"] == trained.find("semidense").digest
     assert found["bytes"] > 0
     assert "numpy" in found["extras"]["versions"]

@@ -24,6 +24,16 @@ def test_every_product_of_the_pipeline_has_a_figure() -> None:
 @pytest.mark.parametrize(
     ("product", "expected"),
     [
+        pytest.param(
+            "calibration",
+            [
+                "held-out training scenes",
+                "none 0.1234, platt 0.1112, isotonic 0.1199",
+                "map: platt",
+                "mean of 3 scenes",
+            ],
+            id="reliability-and-what-R-keeps",
+        ),
         pytest.param("images", ["x (px)", "y (px)", "left view (reference): gray 36", "right view"], id="both-views"),
         pytest.param(
             "truth",
