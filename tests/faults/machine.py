@@ -1,7 +1,10 @@
 """Row 10: random sequences of run, sweep, damage, kill, clean and verify, against a model of what must hold."""
 
+import logging
+import os
 import shutil
 import tempfile
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from hypothesis import HealthCheck, Phase, settings
@@ -9,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
 from cache import Store
+from cache.files import remove
 from cache.gc import Limits, collect, survey
 from cache.verify import verify
 from tests.faults import world
@@ -114,10 +118,31 @@ def _template() -> Path:
 
 
 def random_sequences(scale: float) -> Tally:
-    """Play random sequences; hypothesis shrinks one that goes wrong to the shortest."""
+    """Play random sequences, the large form on all cores; hypothesis shrinks one that goes wrong to the shortest."""
     examples = max(5, int(1000 * scale))
+    tally = Tally(figures={"examples": examples})
+    for injected, notes in _played(examples, scale):
+        tally.injected += injected
+        for note in notes:
+            tally.fail("wrong", note)
+    return tally
+
+
+def _played(examples: int, scale: float) -> list[tuple[int, list[str]]]:
+    """Return what ``_play`` does, one result a process."""
+    processes = min(os.cpu_count() or 1, 4) if scale >= 1 else 1
+    if processes == 1:
+        return [_play(examples, scale)]
+    shares = [examples // processes + (number < examples % processes) for number in range(processes)]
+    with ProcessPoolExecutor(processes, mp_context=world.context()) as pool:
+        return list(pool.map(_play, shares, [scale] * processes))
+
+
+def _play(examples: int, scale: float) -> tuple[int, list[str]]:
+    """Play so many examples; return how many faults they injected, and what went wrong."""
+    logging.getLogger("cache").setLevel(logging.ERROR)  # in a process of its own too
     TRUTH.__init__()  # type: ignore[misc]
-    tally = Tally()
+    notes: list[str] = []
     try:
         run_state_machine_as_test(
             CacheMachine,
@@ -135,12 +160,8 @@ def random_sequences(scale: float) -> Tally:
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt):
             raise
-        tally.fail("wrong", f"{error!r} {getattr(error, '__notes__', '')}")
+        notes.append(f"{error!r} {getattr(error, '__notes__', '')}")
     finally:
         if template := _TEMPLATES.pop("full", None):
-            from cache.files import remove
-
             remove(template.parent)
-    tally.injected = TRUTH.injected
-    tally.figures["examples"] = examples
-    return tally
+    return TRUTH.injected, notes

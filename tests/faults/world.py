@@ -120,6 +120,8 @@ def leftovers(store: Store) -> list[str]:
 # What runs in processes of its own: a server is forked while it has no threads, so that its children may fork safely.
 
 Job = Callable[..., None]
+HANGS = 900.0
+"""Seconds after which a process is taken to hang: many times what it takes on a machine that is busy otherwise."""
 
 
 @cache
@@ -136,7 +138,7 @@ def start(job: Job, *arguments: object, **options: object) -> Any:  # noqa: ANN4
     return process
 
 
-def finish(process: Any, seconds: float = 120) -> int | None:  # noqa: ANN401
+def finish(process: Any, seconds: float = HANGS) -> int | None:  # noqa: ANN401
     """Return a process's exit code; None if it hangs, and is then killed."""
     process.join(seconds)
     if process.exitcode is None:
