@@ -46,6 +46,12 @@ def whole(start: int = 0, *offsets: int) -> Graph:
     return Graph({step.id: step for step in steps}, [(step.id, "") for step in steps])
 
 
+def small(start: int = 0, *offsets: int) -> Graph:
+    """The product that is read and those made from it in tiles: the part of ``whole`` that many trials can afford."""
+    steps = [step for step in whole(start, *offsets).steps.values() if step.product in ("ramp", "blurred")]
+    return Graph({step.id: step for step in steps}, [(step.id, "") for step in steps])
+
+
 def plan(store: Store, graph: Graph) -> Plan:
     return plan_graph(graph, store)
 
@@ -168,6 +174,7 @@ def job_run(
     log: Path,
     graph: tuple[int, ...] = (0,),
     *,
+    make: Callable[..., Graph] = whole,
     die_at: int | None = None,
     raise_at: int | None = None,
     pause: float = 0.0,
@@ -196,7 +203,7 @@ def job_run(
     toy.seen = seen
     publish.STEP_HOOK = hook
     _restrict(user, largest_file)
-    _exit_as_the_command_line(lambda: run(Store(root), whole(*graph), workers))
+    _exit_as_the_command_line(lambda: run(Store(root), make(*graph), workers))
 
 
 def _restrict(user: int | None, largest_file: int | None) -> None:
