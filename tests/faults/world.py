@@ -33,7 +33,15 @@ TRAINED = Stage(
     "tests.pipeline.toy:train_toy",
     monitored=True,
 )
-PRELOADED = ["tests.faults.world", "zarr.codecs", "dask.delayed", "dask.threaded", "distributed", "cache.reader"]
+PRELOADED = [
+    "tests.faults.world",
+    "zarr.codecs",
+    "dask.delayed",
+    "dask.threaded",
+    "distributed",
+    "cache.reader",
+    "torch",
+]
 
 
 def whole(start: int = 0, *offsets: int) -> Graph:
