@@ -33,7 +33,7 @@ def kill_at_random(scale: float) -> Tally:
     longest = _seconds_of_a_run()
     for number in range(max(2, int(25 * scale))):
         _killed(tally, f"trial {number}", chance.uniform(0, longest), pause=0.01, workers=1 + number % 2)
-    for number in range(int(10 * scale) if scale >= 1 else 0):
+    for number in range(int(5 * scale) if scale >= 1 else 0):
         _killed_pipeline(tally, f"pipeline {number}", chance.random())
     return tally
 

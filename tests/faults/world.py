@@ -22,9 +22,11 @@ from pipeline.errors import USER_ERRORS
 from pipeline.plan import Plan, plan_graph
 from pipeline.steps import Graph
 from pipeline.tasks import Made, Unwatched
+from stages.catalog import STAGES
 from stages.stage import Output, Stage
 from tests.faults.tally import Tally
 from tests.pipeline import toy
+from tests.tiny import PATH
 
 TRAINED = Stage(
     "trained",
@@ -40,8 +42,12 @@ PRELOADED = [
     "dask.threaded",
     "distributed",
     "cache.reader",
+    "pipeline.cli",
+    "pipeline.api",
     "torch",
+    *sorted({STAGES[product].compute.partition(":")[0] for product in PATH & set(STAGES)}),
 ]
+"""What the server of processes imports once for all of them."""
 
 
 def whole(start: int = 0, *offsets: int) -> Graph:
