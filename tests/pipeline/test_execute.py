@@ -1,3 +1,4 @@
+import os
 import signal
 import threading
 import time
@@ -205,7 +206,7 @@ def test_an_interrupted_run_leaves_no_draft(
     def interrupt(done: str) -> None:
         if done == step:
             monkeypatch.undo()
-            signal.raise_signal(signal.SIGINT)
+            os.kill(os.getpid(), signal.SIGINT)
             time.sleep(0.2)
 
     monkeypatch.setattr(publish, "STEP_HOOK", interrupt)
