@@ -28,7 +28,7 @@ from cache import publish
 from cache.arrays import check_arrays
 from cache.check import inspect
 from cache.entry import MANIFEST, Entry, Manifest
-from cache.errors import CacheError, DamagedArchive, DamagedEntry, NonDeterministicStage
+from cache.errors import CacheError, CacheUnavailable, DamagedArchive, DamagedEntry, NonDeterministicStage
 from cache.files import make_folder, remove, sync, writing
 from cache.store import Store
 
@@ -68,16 +68,19 @@ def export_entries(store: Store, keys: Iterable[str], target: Path) -> list[Entr
 def _put_in_place(target: Path) -> Iterator[BinaryIO]:
     """Write a file beside its place, and rename it when it is whole and on disk."""
     temporary = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(4)}")
-    with writing(target):
-        try:
-            with temporary.open("xb") as file:
-                yield file
-                file.flush()
-                os.fsync(file.fileno())
-            temporary.replace(target)
-            sync(target.parent)
-        finally:
-            remove(temporary)
+    try:
+        with temporary.open("xb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(target)
+        sync(target.parent)
+    except CacheError:
+        raise
+    except OSError as error:
+        raise CacheUnavailable(f"cannot write the archive {target}: {error.strerror or error}") from error
+    finally:
+        remove(temporary)
 
 
 def _add_entry(archive: tarfile.TarFile, store: Store, key: str) -> Entry:

@@ -8,7 +8,8 @@ at least one thread at work on them, and makes twice what it would have to wait 
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from cache import Lease, Lock, Store
 from pipeline.errors import PipelineError
@@ -31,11 +32,15 @@ class Claims:
         """Prepare for making ``key``; see ``LocalClaims``."""
         self.lease.add([key])
 
+    def opening(self) -> AbstractContextManager[None]:
+        """Return a context in which a draft is begun and told to who deletes the drafts of a run that ends early."""
+        return nullcontext()
+
     def release(self, key: str) -> None:
         """Say that ``key`` is made, or will not be."""
 
     def stop(self) -> None:
-        """Wake all that wait: the run ends early, or is done."""
+        """Wake all that wait, and have no draft begun any more: the run ends early, or is done."""
 
     def close(self) -> None:
         """Give all claims back."""
@@ -51,6 +56,7 @@ class LocalClaims(Claims):
         self._waiting = 0
         self._closed = threading.Event()
         self._lock = threading.Lock()
+        self._opening = threading.Lock()
 
     def take(self, key: str, waiting: Callable[[str], None]) -> None:
         """Claim ``key``, after waiting for a process that has it where that is safe.
@@ -94,6 +100,18 @@ class LocalClaims(Claims):
                 waiting(self._store.claimant(key) or "another process")
         return claim
 
+    @contextmanager
+    def opening(self) -> Iterator[None]:
+        """Return a context in which ``stop`` waits, so that it leaves no draft of which nobody knows yet.
+
+        Raises:
+            RunStopped: if the run ended.
+        """
+        with self._opening:
+            if self._closed.is_set():
+                raise RunStopped("the run ended before this was begun")
+            yield
+
     def release(self, key: str) -> None:
         """Give a claim back; nothing happens to one that was never taken."""
         with self._lock:
@@ -102,8 +120,9 @@ class LocalClaims(Claims):
             claim.release()
 
     def stop(self) -> None:
-        """Wake all that wait: the run ends early, or is done."""
-        self._closed.set()
+        """Wake all that wait, and have no draft begun any more: the run ends early, or is done."""
+        with self._opening:
+            self._closed.set()
 
     def close(self) -> None:
         """Give all claims back."""

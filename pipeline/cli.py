@@ -155,7 +155,7 @@ def explain(
 
         print_json(found)
     else:
-        print_explanation(found)
+        print_explanation(found, graph)
 
 
 @app.command()

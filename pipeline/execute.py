@@ -17,7 +17,7 @@ from pipeline.tasks import Context, Made, Unwatched, Watch
 from pipeline.tiles import cut_rows
 
 SETTLE_SECONDS = 0.3
-"""How long a worker of a cluster may take for the write that it is in when its run ends early."""
+"""How long the write may take that a task is in when its run ends early and does not wait for it."""
 
 
 def execute(
@@ -70,6 +70,12 @@ def _on_threads(plan: Plan, context: Context, threads: int) -> dict[str, Made]:
         # The failed task's siblings go on for a while: what they write must not outlive the drafts.
         context.claims.stop()
         pool.shutdown(wait=True, cancel_futures=True)
+        raise
+    except BaseException:
+        # A signal waits for nobody, but a write that is under way brings its folder back, once.
+        context.claims.stop()
+        drafts.discard()
+        time.sleep(SETTLE_SECONDS)
         raise
     finally:
         context.claims.stop()
@@ -172,9 +178,8 @@ class _Drafts:
 
     def discard(self) -> None:
         """Delete the drafts that were not published."""
-        for draft in self._open.values():
+        for draft in list(self._open.values()):
             draft.discard()
-        self._open.clear()
 
 
 def totals(made: Iterable[Made]) -> dict[str, tuple[int, int]]:

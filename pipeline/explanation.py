@@ -66,8 +66,8 @@ def _of_entry(entry: Entry) -> dict[str, Any]:
     }
 
 
-def print_explanation(found: Mapping[str, Any]) -> None:
-    """Print the ingredients, a line each; code as module and the first digits of its hash."""
+def print_explanation(found: Mapping[str, Any], graph: Path | None = None) -> None:
+    """Print the ingredients, a line each, code as module and the first digits of its hash; and what was drawn."""
     console = Console(highlight=False, soft_wrap=True)
     console.print(f"{found['product']} of {found['scene']}: {found['state']}", style="bold", markup=False)
     console.print(f"key     {found['key'] or 'open until its inputs are made'}")
@@ -86,6 +86,8 @@ def print_explanation(found: Mapping[str, Any]) -> None:
         console.print("\nmade from", style="bold")
         for line in found["tree"][1:]:
             console.print(line, markup=False)
+    if graph:
+        console.print(f"wrote {graph}", markup=False)
 
 
 def _short(value: object) -> str:

@@ -122,7 +122,11 @@ class _Planner:
         self, step: Step, recipe: Recipe | None, changed: tuple[Change, ...], damage: str | None = None
     ) -> Planned:
         state: State = "stale" if self._earlier(step) else "missing"
-        causes = self._reasons.of(step, changed, self._causes) if self._reasons and not damage else ()
+        if damage:
+            damage = damage.removeprefix(f"the entry {recipe.key if recipe else ''} is damaged: ")
+            causes: tuple[str, ...] = (f"{step.product} is damaged: {damage}",)
+        else:
+            causes = self._reasons.of(step, changed, self._causes) if self._reasons else ()
         self._causes[step.id] = causes
         return Planned(step, state, recipe.key if recipe else None, changed=changed, damage=damage, causes=causes)
 

@@ -119,8 +119,9 @@ def _begin_claimed(
         context.claims.release(recipe.key)
         return Job(step, keys, None, made)
     _set_damaged_aside(context.store, recipe.key)
-    draft = context.store.begin(recipe, step.label)
-    context.watch.begun(step, draft, tiles)
+    with context.claims.opening():
+        draft = context.store.begin(recipe, step.label)
+        context.watch.begun(step, draft, tiles)
     return Job(step, keys, draft, None)
 
 

@@ -7,11 +7,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from cache import code_hash_of
 from pipeline.ancestry import Ancestor
 from pipeline.errors import UsageError
 
-WIDTH, HEIGHT = 2.5, 1.15
+WIDTH, HEIGHT = 2.5, 1.25
 """Inches of a box with the space around it."""
+PIXELS, POINTS = 150, 72
+"""Units an inch: of a PNG, and of SVG and PDF, which are drawn in points."""
 FORMATS = (".svg", ".png", ".pdf")
 COLOURS = {"origin": "#dceefb", "net": "#fdeccb", "product": "#f4f4f4", "gone": "#f8d7da"}
 """What is read, trained networks and weights, what is computed, what was deleted since."""
@@ -32,16 +35,17 @@ def save_graph(chain: Sequence[Ancestor], path: Path) -> None:
         raise UsageError(f"--graph {path}: the name must end in {', '.join(FORMATS)}")
     from matplotlib import rc_context
 
+    ending = path.suffix.lower()
     try:
         with rc_context({"svg.fonttype": "none", "svg.hashsalt": "provenance"}):
-            metadata = {"Date": None} if path.suffix.lower() == ".svg" else None
-            draw_graph(chain).savefig(path, dpi=150, metadata=metadata)
+            metadata = {"Date": None} if ending == ".svg" else None
+            draw_graph(chain, PIXELS if ending == ".png" else POINTS).savefig(path, dpi="figure", metadata=metadata)
     except OSError as error:
         raise UsageError(f"--graph {path}: {error.strerror or error}") from None
 
 
-def draw_graph(chain: Sequence[Ancestor]) -> Figure:
-    """Return the picture of a chain, nearest first as ``ancestry`` gives it."""
+def draw_graph(chain: Sequence[Ancestor], dpi: int) -> Figure:
+    """Return the picture of a chain, nearest first as ``ancestry`` gives it, to be saved at just this resolution."""
     members: dict[Box, list[Ancestor]] = {}
     box_of: dict[tuple[str, str], Box] = {}
     for each in chain:
@@ -51,7 +55,7 @@ def draw_graph(chain: Sequence[Ancestor]) -> Figure:
     parents = {box: list(dict.fromkeys(_parents(found, box_of))) for box, found in members.items()}
     places = _places(parents)
     rows, columns = (1 + max(place[axis] for place in places.values()) for axis in (0, 1))
-    figure = Figure(figsize=(max(4.0, columns * WIDTH), rows * HEIGHT + 0.3))
+    figure = Figure(figsize=(max(4.0, columns * WIDTH), rows * HEIGHT + 0.3), dpi=dpi)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(-0.5, columns - 0.5), ylim=(rows - 0.4, -0.6))
     axes.axis("off")
@@ -135,5 +139,6 @@ def _text(box: Box, found: Sequence[Ancestor]) -> str:
     if each.entry is None:
         return f"{title}\ndeleted since\n{each.digest[:12]}"
     origin = "".join(f"\n{name} {value[:8]}" for name, value in each.origins.items() if name != "reader")
+    code = f"\ncode {code_hash_of(each.entry.recipe.code)[:8]}"
     key = "" if len(found) > 1 else f"\n{each.entry.key[:12]}"
-    return f"{title}\n{scene}{key}{origin if len(found) == 1 else ''}"
+    return f"{title}\n{scene}{key}{origin if len(found) == 1 else ''}{code}"

@@ -76,7 +76,7 @@ def test_what_is_not_there_is_not_exported(store: Store, tmp_path: Path) -> None
 
 
 def test_a_folder_that_is_not_there_is_explained(store: Store, make: Make, tmp_path: Path) -> None:
-    with pytest.raises(CacheUnavailable, match="cannot write"):
+    with pytest.raises(CacheUnavailable, match=r"cannot write the archive .*x\.tar: No such file or directory$"):
         export_entries(store, [make(store).key], tmp_path / "none" / "x.tar")
 
 

@@ -1,7 +1,10 @@
 """Row 10: random sequences of run, sweep, damage, kill, clean and verify, against a model of what must hold."""
 
+import logging
+import os
 import shutil
 import tempfile
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from hypothesis import HealthCheck, Phase, settings
@@ -9,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
 from cache import Store
+from cache.files import remove
 from cache.gc import Limits, collect, survey
 from cache.verify import verify
 from tests.faults import world
@@ -43,7 +47,7 @@ class CacheMachine(RuleBasedStateMachine):
     @rule(offsets=OFFSETS)
     def run(self, offsets: tuple[int, ...]) -> None:
         """Run, or sweep: what is there is reused, the rest made, all as undisturbed."""
-        made = world.run(self.store, world.whole(0, *offsets))
+        made = world.run(self.store, world.small(0, *offsets))
         for each in made.values():
             assert self.expected[each.key] == each.digest
             assert each.reused == (each.key in self.there), f"{each.step.name}: reused {each.reused}"
@@ -61,10 +65,11 @@ class CacheMachine(RuleBasedStateMachine):
         self.there.discard(key)
         assert self.store.check(key) is not None
 
-    @rule(offsets=OFFSETS, step=st.integers(0, 70))
+    @rule(offsets=OFFSETS, step=st.integers(0, 45))
     def kill(self, offsets: tuple[int, ...], step: int) -> None:
         """Kill a run at a step; nothing that was there is lost, and what is new is whole."""
-        code = world.in_child(world.job_run, self.root, self.root.parent / "log", (0, *offsets), die_at=step)
+        options = {"make": world.small, "die_at": step}
+        code = world.in_child(world.job_run, self.root, self.root.parent / "log", (0, *offsets), **options)
         TRUTH.injected += 1
         assert code in (0, -9), world.said(self.root.parent / "log")
         self.look()
@@ -100,7 +105,7 @@ class CacheMachine(RuleBasedStateMachine):
     def teardown(self) -> None:
         """Recover once more, and throw the cache away."""
         tally = Tally()
-        world.recover(tally, self.store, world.whole(0, *ALL), self.expected, "at the end")
+        world.recover(tally, self.store, world.small(0, *ALL), self.expected, "at the end")
         self.place.__exit__(None, None, None)
         assert tally.clean, tally.notes
 
@@ -108,16 +113,37 @@ class CacheMachine(RuleBasedStateMachine):
 def _template() -> Path:
     if "full" not in _TEMPLATES:
         root = Path(tempfile.mkdtemp(prefix="faults-template-")) / "cache"
-        world.run(Store(root), world.whole(0, *ALL))
+        world.run(Store(root), world.small(0, *ALL))
         _TEMPLATES["full"] = root
     return _TEMPLATES["full"]
 
 
 def random_sequences(scale: float) -> Tally:
-    """Play random sequences; hypothesis shrinks one that goes wrong to the shortest."""
+    """Play random sequences, the large form in several processes; one that goes wrong is shrunk to the shortest."""
     examples = max(5, int(1000 * scale))
+    tally = Tally(figures={"examples": examples})
+    for injected, notes in _played(examples, scale):
+        tally.injected += injected
+        for note in notes:
+            tally.fail("wrong", note)
+    return tally
+
+
+def _played(examples: int, scale: float) -> list[tuple[int, list[str]]]:
+    """Return what ``_play`` does, one result a process."""
+    processes = min(2 * (os.cpu_count() or 1), 8) if scale >= 1 else 1  # half of them wait for one to be killed
+    if processes == 1:
+        return [_play(examples, scale)]
+    shares = [examples // processes + (number < examples % processes) for number in range(processes)]
+    with ProcessPoolExecutor(processes, mp_context=world.context()) as pool:
+        return list(pool.map(_play, shares, [scale] * processes))
+
+
+def _play(examples: int, scale: float) -> tuple[int, list[str]]:
+    """Play so many examples; return how many faults they injected, and what went wrong."""
+    logging.getLogger("cache").setLevel(logging.ERROR)  # in a process of its own too
     TRUTH.__init__()  # type: ignore[misc]
-    tally = Tally()
+    notes: list[str] = []
     try:
         run_state_machine_as_test(
             CacheMachine,
@@ -135,12 +161,8 @@ def random_sequences(scale: float) -> Tally:
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt):
             raise
-        tally.fail("wrong", f"{error!r} {getattr(error, '__notes__', '')}")
+        notes.append(f"{error!r} {getattr(error, '__notes__', '')}")
     finally:
         if template := _TEMPLATES.pop("full", None):
-            from cache.files import remove
-
             remove(template.parent)
-    tally.injected = TRUTH.injected
-    tally.figures["examples"] = examples
-    return tally
+    return TRUTH.injected, notes

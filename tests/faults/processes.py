@@ -28,13 +28,23 @@ def kill_at_steps(scale: float) -> Tally:
 
 
 def kill_at_random(scale: float) -> Tally:
-    """Kill a run, and one of the real pipeline, at a random time."""
+    """Kill a run, and one of the real pipeline, at a random time of those that an undisturbed one takes."""
     tally, chance = Tally(), random.Random(2)
+    longest = _seconds_of_a_run()
     for number in range(max(2, int(25 * scale))):
-        _killed(tally, f"trial {number}", chance.uniform(0.05, 0.6), pause=0.01, workers=1 + number % 2)
-    for number in range(int(10 * scale) if scale >= 1 else 0):
-        _killed_pipeline(tally, f"pipeline {number}", chance.uniform(0.2, 4.0))
+        _killed(tally, f"trial {number}", chance.uniform(0, longest), pause=0.01, workers=1 + number % 2)
+    for number in range(int(5 * scale) if scale >= 1 else 0):
+        _killed_pipeline(tally, f"pipeline {number}", chance.random())
     return tally
+
+
+def _seconds_of_a_run() -> float:
+    """Return what an undisturbed run takes here and now; the first one of all also starts the server of processes."""
+    for _ in range(2):
+        started = time.monotonic()
+        with world.folder() as root:
+            world.in_child(world.job_run, root, root.parent / "log", pause=0.01)
+    return time.monotonic() - started
 
 
 def _killed(tally: Tally, where: str, after: float | None = None, **options: Any) -> None:  # noqa: ANN401
@@ -53,8 +63,11 @@ def job_pipeline(root: Path, log: Path, number: int | None = None, step: int = 0
     import sys
 
     world.quiet(log)
+    import torch
+
     from pipeline.cli import main
 
+    torch.set_num_threads(1)  # on a busy machine, threads of one product would mostly wait for one another
     seen: list[str] = []
 
     def hook(name: str) -> None:
@@ -76,11 +89,12 @@ def job_pipeline(root: Path, log: Path, number: int | None = None, step: int = 0
         os._exit(world.OTHER_ERROR)
 
 
-def _killed_pipeline(tally: Tally, where: str, after: float) -> None:
+def _killed_pipeline(tally: Tally, where: str, part: float) -> None:
+    """Kill the real pipeline when a part of the time is over that an undisturbed run took."""
     expected = _pipeline_truth()
     with world.folder() as root:
         process = world.start(job_pipeline, root, root.parent / "log")
-        time.sleep(after)
+        time.sleep(part * _SECONDS[0])
         process.kill()
         world.finish(process)
         tally.injected += 1
@@ -102,14 +116,17 @@ def _recover_pipeline(tally: Tally, root: Path, expected: dict[str, str], where:
 
 
 _TRUTH: dict[str, str] = {}
+_SECONDS: list[float] = []
+"""What the undisturbed run of the pipeline took."""
 
 
 def _pipeline_truth() -> dict[str, str]:
     if not _TRUTH:
         with world.folder() as root:
-            log = root.parent / "log"
+            log, started = root.parent / "log", time.monotonic()
             if (code := world.in_child(job_pipeline, root, log)) != 0:
                 raise RuntimeError(f"an undisturbed run failed: exit {code}: {world.said(log)}")
+            _SECONDS[:] = [time.monotonic() - started]
             _TRUTH.update({entry.key: entry.digest for entry in Store(root).entries()})
     return _TRUTH
 

@@ -22,9 +22,11 @@ from pipeline.errors import USER_ERRORS
 from pipeline.plan import Plan, plan_graph
 from pipeline.steps import Graph
 from pipeline.tasks import Made, Unwatched
+from stages.catalog import STAGES
 from stages.stage import Output, Stage
 from tests.faults.tally import Tally
 from tests.pipeline import toy
+from tests.tiny import PATH
 
 TRAINED = Stage(
     "trained",
@@ -33,7 +35,19 @@ TRAINED = Stage(
     "tests.pipeline.toy:train_toy",
     monitored=True,
 )
-PRELOADED = ["tests.faults.world", "zarr.codecs", "dask.delayed", "dask.threaded", "distributed", "cache.reader"]
+PRELOADED = [
+    "tests.faults.world",
+    "zarr.codecs",
+    "dask.delayed",
+    "dask.threaded",
+    "distributed",
+    "cache.reader",
+    "pipeline.cli",
+    "pipeline.api",
+    "torch",
+    *sorted({STAGES[product].compute.partition(":")[0] for product in PATH & set(STAGES)}),
+]
+"""What the server of processes imports once for all of them."""
 
 
 def whole(start: int = 0, *offsets: int) -> Graph:
@@ -43,6 +57,12 @@ def whole(start: int = 0, *offsets: int) -> Graph:
     for offset in offsets or (0,):
         blurred = toy.step(toy.BLURRED, toy.Offset(offset=offset, reach=1), ramp=ramp)
         steps += [blurred, toy.step(toy.SUM, offset, blurred=blurred)]
+    return Graph({step.id: step for step in steps}, [(step.id, "") for step in steps])
+
+
+def small(start: int = 0, *offsets: int) -> Graph:
+    """The product that is read and those made from it in tiles: the part of ``whole`` that many trials can afford."""
+    steps = [step for step in whole(start, *offsets).steps.values() if step.product in ("ramp", "blurred")]
     return Graph({step.id: step for step in steps}, [(step.id, "") for step in steps])
 
 
@@ -120,6 +140,8 @@ def leftovers(store: Store) -> list[str]:
 # What runs in processes of its own: a server is forked while it has no threads, so that its children may fork safely.
 
 Job = Callable[..., None]
+HANGS = 900.0
+"""Seconds after which a process is taken to hang: many times what it takes on a machine that is busy otherwise."""
 
 
 @cache
@@ -136,7 +158,7 @@ def start(job: Job, *arguments: object, **options: object) -> Any:  # noqa: ANN4
     return process
 
 
-def finish(process: Any, seconds: float = 120) -> int | None:  # noqa: ANN401
+def finish(process: Any, seconds: float = HANGS) -> int | None:  # noqa: ANN401
     """Return a process's exit code; None if it hangs, and is then killed."""
     process.join(seconds)
     if process.exitcode is None:
@@ -166,6 +188,7 @@ def job_run(
     log: Path,
     graph: tuple[int, ...] = (0,),
     *,
+    make: Callable[..., Graph] = whole,
     die_at: int | None = None,
     raise_at: int | None = None,
     pause: float = 0.0,
@@ -194,7 +217,7 @@ def job_run(
     toy.seen = seen
     publish.STEP_HOOK = hook
     _restrict(user, largest_file)
-    _exit_as_the_command_line(lambda: run(Store(root), whole(*graph), workers))
+    _exit_as_the_command_line(lambda: run(Store(root), make(*graph), workers))
 
 
 def _restrict(user: int | None, largest_file: int | None) -> None:

@@ -1,3 +1,5 @@
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -41,6 +43,32 @@ def test_who_waits_says_for_whom_and_goes_on_when_it_is_free(store: Store, claim
     free = store.claim(KEY)
     assert free
     free.release()
+
+
+def test_who_waits_takes_over_from_a_process_that_is_killed(store: Store, claims: LocalClaims) -> None:
+    program = f"""
+import time
+from pathlib import Path
+from cache import Store
+claim = Store(Path({str(store.root)!r})).claim({KEY!r})
+print("has it", flush=True)
+time.sleep(600)
+"""
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout
+        assert other.stdout.readline() == "has it\n"
+        told: list[str] = []
+        thread = threading.Thread(target=claims.take, args=(KEY, told.append))
+        thread.start()
+        deadline = time.monotonic() + 60
+        while not told and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert thread.is_alive()
+        other.kill()
+        thread.join(60)
+    assert not thread.is_alive()
+    assert f"process {other.pid} on " in told[0]
+    assert store.claim(KEY) is None, "it has the claim now"
 
 
 def test_a_run_never_waits_with_all_its_threads_while_its_own_products_stand_still(store: Store) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from cache import Store
+from cache import Store, code_hash_of
 from pipeline.ancestry import ancestry, tree_lines
 from tests.pipeline.toy import chain
 
@@ -87,7 +87,8 @@ def test_the_chain_of_an_entry_is_told_and_drawn(invoke: Invoke, filled: Store, 
         "blurred",
         "ramp",
     ]
-    assert all(name in picture.read_text() for name in ("<svg", "sum", "blurred", "ramp", key[:12]))
+    named = ("<svg", "sum", "blurred", "ramp", key[:12], f"code {code_hash_of({'make_sum': '1f'})[:8]}")
+    assert all(name in picture.read_text() for name in named)
     found = json.loads(invoke("cache", "trace", key, "--json", "--cache", filled.root).out)["provenance"]
     assert [each["product"] for each in found] == ["sum", "blurred", "ramp"]
     refused = invoke("cache", "trace", key, "--graph", tmp_path / "graph.txt", "--cache", filled.root)

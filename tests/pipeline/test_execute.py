@@ -1,4 +1,7 @@
+import os
+import signal
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +11,7 @@ import dask
 import numpy as np
 import pytest
 
-from cache import NonDeterministicStage, Store
+from cache import NonDeterministicStage, Store, publish
 from cache.owner import owner
 from pipeline.errors import StageFailed, StageRefused
 from pipeline.execute import execute, totals
@@ -192,6 +195,24 @@ def test_nothing_is_written_after_a_failure(
         toy_run(failing("fail_below"), workers=3)
     assert drafts() == []
     assert [entry.label["product"] for entry in store.entries()] == ["ramp"]
+
+
+@pytest.mark.parametrize("step", ["begun", "array created", "chunk written"])
+def test_an_interrupted_run_leaves_no_draft(
+    step: str, toy_run: ToyRun, monkeypatch: pytest.MonkeyPatch, drafts: Drafts
+) -> None:
+    """Also not one that was just being begun, and of which the run did not know yet."""
+
+    def interrupt(done: str) -> None:
+        if done == step:
+            monkeypatch.undo()
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.2)
+
+    monkeypatch.setattr(publish, "STEP_HOOK", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        toy_run(chain())
+    assert drafts() == []
 
 
 def test_a_damaged_entry_is_set_aside_and_made_again(toy_run: ToyRun, store: Store) -> None:

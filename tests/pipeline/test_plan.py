@@ -1,6 +1,7 @@
 """The planner on toy steps, and on the real ones where it matters what depends on what."""
 
 import os
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -103,10 +104,11 @@ def test_a_damaged_entry_is_told_apart_and_left_alone(
     chunk.parent.chmod(0o700)
     chunk.unlink()
     object.__setattr__(store, "verify", verify)
-    blurred = toy_plan(chain()).steps[1]
+    _, blurred, below = toy_plan(chain()).steps
     assert blurred.state == "stale"
     assert blurred.damage is not None
-    assert "\n" not in blurred.damage
+    assert re.fullmatch(r"data\.zarr\S+ is missing", blurred.damage)
+    assert blurred.causes == below.causes == (f"blurred is damaged: {blurred.damage}",)
     assert store.layout.entry(key).is_dir(), "looking at it does not move it"
 
 

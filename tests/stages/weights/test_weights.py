@@ -1,5 +1,7 @@
+import io
 import json
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -58,6 +60,28 @@ def test_the_file_says_what_it_is_and_how_it_was_made(tmp_path: pytest.TempPathF
 
 def test_the_same_weights_give_the_same_bytes() -> None:
     assert save_weights("matching_net", VECTOR, {}) == FILE
+
+
+class Payload:
+    """A pickle of it makes a file, if anything ever loads it."""
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[object, tuple[str, str]]:
+        return open, (self.path, "w")
+
+
+def test_a_payload_in_place_of_weights_never_runs(tmp_path: Path) -> None:
+    marker = tmp_path / "it ran"
+    file = io.BytesIO()
+    torch.save(Payload(str(marker)), file)
+    for data in (pickle.dumps(Payload(str(marker))), file.getvalue()):
+        with pytest.raises(StageError, match="no safetensors file"):
+            read_weights("matching_net", data)
+    assert not marker.exists()
+    pickle.loads(pickle.dumps(Payload(str(marker)))).close()
+    assert marker.exists(), "it would have run"
 
 
 @pytest.mark.parametrize(
