@@ -9,7 +9,7 @@ from typing import Any
 
 from pipeline.console import mean_rows
 from pipeline.markup import Html, folded, table, tag, text
-from pipeline.reporting.figures_tables import THRESHOLD_PX, auc_table, metrics_tables
+from pipeline.reporting.figures_tables import THRESHOLD_PX, auc_table, matcher_points, matchers_table, metrics_tables
 from pipeline.reporting.galleries import gallery
 from pipeline.reporting.gathered import Gathered
 from pipeline.reporting.graph import graph, steps_table
@@ -127,7 +127,10 @@ def _curves(found: Gathered) -> Html:
     if not chosen:
         return ""
     drawn = error_curve_figure(
-        chosen, title="What a threshold on the confidence buys, and what it costs", threshold=THRESHOLD_PX
+        chosen,
+        title="What a threshold on the confidence buys, and what it costs",
+        threshold=THRESHOLD_PX,
+        others=matcher_points(found.compared, len(_tallies(found))),
     )
     rows_told = [
         [f"{row['R']:g}", f"{row['invalid']:.1f}", f"{row['bad']:.2f}"] for row in (mean_rows(chosen) or chosen)
@@ -135,13 +138,12 @@ def _curves(found: Gathered) -> Html:
     figures = table(
         ["R", "invalid (%)", "error of kept (%)"], rows_told, caption="The mean of the scenes, point by point"
     )
-    return svg(drawn, "Error of the kept pixels against the share of invalid ones, for each threshold R") + folded(
-        "As numbers", figures
-    )
+    told = svg(drawn, "Error of the kept pixels against the share of invalid ones, for each threshold R")
+    return told + folded("As numbers", figures) + matchers_table(found.compared)
 
 
 def _confidence(found: Gathered) -> Html:
-    ranked = auc_table(found.rows) if any("auc" in row for row in found.rows) else ""
+    ranked = auc_table(found.rows, found.compared) if any("auc" in row for row in found.rows) else ""
     tallies = [tally for _, tally in _tallies(found)]
     if not tallies:
         return ranked
@@ -167,5 +169,10 @@ def _keys(found: Gathered) -> Html:
         [each.step.product, each.step.scene, found.entries[each.key].created[:19].replace("T", " "), each.key]
         for each in found.hits
         if each.key
+    ]
+    rows += [
+        [product, scene.name, found.entries[key].created[:19].replace("T", " "), key]
+        for scene in found.scenes
+        for product, key in scene.baselines.items()
     ]
     return table(["product", "scene", "made (UTC)", "key"], rows, caption="Where each product is in the cache", words=4)

@@ -43,7 +43,8 @@ def small_picture(product: str, dataset: xr.Dataset) -> Small | None:
 
 def small_disparity(disparity: NDArray[np.float32]) -> Small:
     """Return a small picture of a disparity map (y, x), px; NaN is black, and its share told of the whole map."""
-    step = step_for(*disparity.shape, _PIXELS)
+    height, width = disparity.shape
+    step = step_for(height, width, _PIXELS)
     low, high = disparity_span(disparity)
     share = 100 * np.count_nonzero(np.isnan(disparity)) / max(disparity.size, 1)
     legend = f"disparity: blue {low:g} px (far), yellow {high:g} px (near), black none ({share:.1f} %)"
