@@ -96,18 +96,20 @@ def _same(recipe: Recipe, step: Step) -> bool:
     return recipe == Recipe(step.product, step.code, step.settings, recipe.inputs, step.environment)
 
 
-def baseline_rows(scene: str, keys: Mapping[str, str], baselines: Mapping[str, str], store: Store) -> list[Row]:
-    """Return the rows of the comparison of a scene's cached baselines, as ``pipeline compare`` has them.
+def compared_rows(
+    scene: str, keys: Mapping[str, str], store: Store, masks: Sequence[str], thresholds: Sequence[float]
+) -> list[Row]:
+    """Return the rows of the comparison of what is cached of a scene, as ``pipeline compare`` has them.
 
     Args:
         scene: its name.
-        keys: of the pipeline's own products that are cached.
-        baselines: keys of the baselines that are.
+        keys: of the products that are cached, baselines among them.
         store: the cache.
+        masks: those that figures are wanted for.
+        thresholds: px, those that figures are wanted for.
     """
-    if not baselines or not {"truth", *OWN} <= set(keys):
+    if not {"truth", *OWN} <= set(keys):
         return []
-    own = {name: read_arrays(store, keys[name]) for name in ("truth", *OWN)}
-    products = own | {product: read_arrays(store, key) for product, key in baselines.items()}
-    judged = Judged(scene, own["truth"])
+    products = {name: read_arrays(store, keys[name]) for name in ("truth", *OWN, *PRODUCTS) if name in keys}
+    judged = Judged(scene, products["truth"], masks, thresholds)
     return [*matcher_rows(judged, products), *measure_rows(judged, products)]

@@ -10,11 +10,14 @@ from pipeline.api import METHOD, Task, open_store, status
 from pipeline.errors import UsageError
 from pipeline.lineage import lineage
 from pipeline.plan import Plan, Planned
-from pipeline.reporting.baselines import baseline_rows, cached_baselines
+from pipeline.reporting.baselines import cached_baselines, compared_rows
 from pipeline.steps import SPLIT
 from pipeline.tasks import read_arrays
 from pipeline.views.scene_maps import SceneMaps
 from stages.metrics import metric_rows
+
+MASK, THRESHOLD_PX = "nonocc", 1.0
+"""Mask, and error in px of the image at hand, of the tables and curves that stand first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +57,8 @@ class GatheredScene:
 
     @cached_property
     def compared(self) -> list[dict[str, Any]]:
-        """The rows of the baselines; none if none is cached."""
-        return baseline_rows(self.name, self.keys, self.baselines, self.store)
+        """The rows of the comparison with the baselines that are cached, at ``MASK`` and ``THRESHOLD_PX``."""
+        return compared_rows(self.name, {**self.keys, **self.baselines}, self.store, [MASK], [THRESHOLD_PX])
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +105,7 @@ class Gathered:
 
     @property
     def compared(self) -> list[dict[str, Any]]:
-        """The rows of the baselines of all scenes."""
+        """The rows of the comparison of all scenes."""
         return [row for scene in self.scenes for row in scene.compared]
 
 

@@ -9,9 +9,9 @@ from typing import Any
 
 from pipeline.console import mean_rows
 from pipeline.markup import Html, folded, table, tag, text
-from pipeline.reporting.figures_tables import THRESHOLD_PX, auc_table, matcher_points, matchers_table, metrics_tables
+from pipeline.reporting.figures_tables import auc_table, matcher_points, matchers_table, metrics_tables
 from pipeline.reporting.galleries import gallery
-from pipeline.reporting.gathered import Gathered
+from pipeline.reporting.gathered import MASK, THRESHOLD_PX, Gathered
 from pipeline.reporting.graph import graph, steps_table
 from pipeline.reporting.networks import networks
 from pipeline.reporting.pictures import svg
@@ -61,7 +61,7 @@ def _title(found: Gathered) -> Iterator[Html]:
 
 def _cards(found: Gathered) -> Html:
     """Return the figures that one looks for first."""
-    rows = [row for row in found.rows if row["mask"] == "nonocc" and row["threshold_px"] == THRESHOLD_PX]
+    rows = [row for row in found.rows if row["mask"] == MASK and row["threshold_px"] == THRESHOLD_PX]
     count = len(found.scenes)
     cards = [(str(count), "scenes with something cached" if count > 1 else f"scene: {found.scenes[0].name}")]
     if rows:
@@ -143,7 +143,7 @@ def _curves(found: Gathered) -> Html:
 
 
 def _confidence(found: Gathered) -> Html:
-    ranked = auc_table(found.rows, found.compared) if any("auc" in row for row in found.rows) else ""
+    ranked = auc_table(found.compared)
     tallies = [tally for _, tally in _tallies(found)]
     if not tallies:
         return ranked

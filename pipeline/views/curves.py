@@ -144,6 +144,7 @@ def _label(axes: Axes, mask: str, threshold: float) -> None:
     axes.set_ylabel(f"bad: reported {mask} pixels off by more than {threshold:g} px (%)")
     axes.set_ylim(bottom=0)
     axes.margins(x=0.12)
+    axes.set_xlim(left=-1)
     axes.grid(alpha=0.3)
     legend = axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False, fontsize="small")
     for text in legend.get_texts():
