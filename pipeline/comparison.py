@@ -86,6 +86,11 @@ class Comparison:
         """The names of the scenes, in order."""
         return list(dict.fromkeys(row["scene"] for row in self.rows))
 
+    @property
+    def R(self) -> float | None:  # noqa: N802 - the paper's name
+        """The least confidence that our semi-dense map keeps; None where a density was asked for instead."""
+        return next(iter(_asked(self.result).values()))["semidense"].step.R
+
     def arrays(self, scene: str) -> dict[str, Arrays]:
         """Return the arrays of every product of a scene that was asked for, in memory."""
         return _read(self.result, _asked(self.result)[scene])

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pipeline.comparison_rows import Row
 from pipeline.comparison_rows import mean_rows as comparison_means
 from pipeline.console import mean_rows
-from pipeline.markup import Html, folded, table
+from pipeline.markup import Html, folded, table, tag, text
 from pipeline.reporting.gathered import MASK, THRESHOLD_PX
 
 _COLUMNS = {
@@ -16,6 +16,9 @@ _COLUMNS = {
     "avgerr": ("mean error of kept (px)", "{:.2f}"),
     "rms": ("rms of kept (px)", "{:.2f}"),
 }
+_NONE_CACHED = (
+    "No other matcher is cached for these scenes; `pipeline compare` makes them, and they then stand here too."
+)
 
 
 def metrics_tables(rows: Sequence[Row], R: float) -> Html:
@@ -39,7 +42,7 @@ def _cells(row: Row) -> list[str]:
 
 def auc_table(compared: Sequence[Row]) -> Html:
     """Return the area under the error curve of each cached measure of confidence beside what a perfect one reaches."""
-    rows = [row for row in compared if row["experiment"] == "auc" and "auc" in row]
+    rows = _area_rows(compared)
     if not rows:
         return ""
     means = comparison_means(rows)
@@ -67,21 +70,38 @@ def _area(row: Row) -> str:
     return f"{row['auc']:.4f}" if "auc" in row else "-"
 
 
+def _area_rows(compared: Sequence[Row]) -> list[Row]:
+    return [row for row in compared if row["experiment"] == "auc" and "auc" in row]
+
+
 def _density_rows(compared: Sequence[Row]) -> list[Row]:
     return [row for row in compared if row["experiment"] == "density"]
 
 
 def matcher_points(compared: Sequence[Row], scenes: int) -> list[Row]:
     """Return the mean of each other matcher that is cached for so many scenes: means over fewer do not compare."""
-    means = comparison_means(_density_rows(compared))
-    return [row for row in means if row["scene"] == f"mean of {scenes}" and "bad" in row]
+    over = f"mean of {scenes}"
+    means = [row for row in comparison_means(_density_rows(compared)) if row["scene"] == over and "bad" in row]
+    return [row | {"method": f"{row['method']}, {over}"} for row in means] if scenes > 1 else means
+
+
+def measure_points(compared: Sequence[Row]) -> list[Row]:
+    """Return the areas of the measures that are cached for every scene; none if it is one measure alone."""
+    rows = _area_rows(compared)
+    scenes = {row["scene"] for row in rows}
+    methods = [
+        method
+        for method in dict.fromkeys(row["method"] for row in rows)
+        if {row["scene"] for row in rows if row["method"] == method} == scenes
+    ]
+    return [row for row in rows if row["method"] in methods] if len(methods) > 1 else []
 
 
 def matchers_table(compared: Sequence[Row]) -> Html:
     """Return what other matchers that are cached report, beside the error of the kept pixels at the same density."""
     rows = _density_rows(compared)
     if not rows:
-        return ""
+        return tag("p", text(_NONE_CACHED), class_="quiet")
     head = ["method", "scene", "not kept (%)", "error of kept (%)", "error of dual-cnn at that density (%)"]
     figures = ("invalid", "bad", "bad_dual_cnn")
     means, every = (

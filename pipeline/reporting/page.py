@@ -9,13 +9,14 @@ from typing import Any
 
 from pipeline.console import mean_rows
 from pipeline.markup import Html, folded, table, tag, text
-from pipeline.reporting.figures_tables import auc_table, matcher_points, matchers_table, metrics_tables
+from pipeline.reporting.figures_tables import auc_table, matcher_points, matchers_table, measure_points, metrics_tables
 from pipeline.reporting.galleries import gallery
 from pipeline.reporting.gathered import MASK, THRESHOLD_PX, Gathered
 from pipeline.reporting.graph import graph, steps_table
 from pipeline.reporting.networks import networks
 from pipeline.reporting.pictures import svg
 from pipeline.tasks import provenance
+from pipeline.views.comparison import dots_figure
 from pipeline.views.curves import error_curve_figure
 from pipeline.views.reliability import reliability, reliability_figure
 from pipeline.views.tally import Tally
@@ -101,7 +102,9 @@ def _parts(found: Gathered) -> Iterator[tuple[str, Html]]:
 
 def _what_ran(found: Gathered) -> Html:
     hits = len(found.hits)
+    beside = sum(len(scene.baselines) for scene in found.scenes)
     told = f"{hits} of {len(found.plan.steps)} products are cached. What is missing is left out below."
+    told += f" For comparison, {beside} products of other methods are cached." if beside else ""
     notes = "".join(tag("li", text(note)) for note in found.plan.notes)
     return (
         tag("p", text(told)) + graph(found) + steps_table(found) + (tag("ul", notes, class_="quiet") if notes else "")
@@ -148,9 +151,13 @@ def _confidence(found: Gathered) -> Html:
     if not tallies:
         return ranked
     drawn = reliability_figure(reliability(tallies), title="Is the confidence a probability?")
-    return tag(
-        "div", svg(drawn, "Reliability: share of right pixels against their confidence"), ranked, class_="charts"
-    )
+    diagram = svg(drawn, "Reliability: share of right pixels against their confidence")
+    rows = measure_points(found.compared)
+    if not rows:
+        return tag("div", diagram, ranked, class_="charts")
+    dots = dots_figure(rows, "auc", title="How well does a confidence rank pixels?")
+    areas = svg(dots, "Area under the error curve of each measure of confidence: its mean, and a dot a scene")
+    return tag("div", diagram, areas, class_="charts") + ranked
 
 
 def _configuration(found: Gathered) -> Html:

@@ -132,7 +132,7 @@ def draw_matchers(axes: Axes, means: Iterable[Row]) -> None:
         style: dict[str, Any] = {
             "color": colour,
             "markeredgecolor": "black",
-            "markersize": 10,
+            "markersize": 8.5,
             "linestyle": "none",
             "zorder": 6,
         }
