@@ -108,11 +108,14 @@ def auc_rows(
     judged: Judged, method: str, confidence: NDArray[np.float32], disparity: NDArray[np.float32]
 ) -> Iterator[Row]:
     """Yield the area under the error curve of a confidence of a raw map, and the area of a perfect one."""
+    rankings: dict[str, Ranking] = {}  # sorting is what takes time, and all thresholds share it
     for row, mask, threshold in judged.rows("auc", method):
         chosen = counted(judged.disparity, mask)
+        if row["mask"] not in rankings:
+            rankings[row["mask"]] = Ranking.of(confidence[chosen])
         correct = np.abs(disparity - judged.disparity)[chosen] <= threshold
         error_rate = float(np.mean(~correct)) if correct.size else float("nan")
-        auc = Ranking.of(confidence[chosen]).auc(correct)
+        auc = rankings[row["mask"]].auc(correct)
         yield row | _known({"raw_bad": 100 * error_rate, "auc": auc, "auc_optimal": optimal_auc(error_rate)})
 
 

@@ -155,7 +155,7 @@ def _confidence(found: Gathered) -> Html:
     rows = measure_points(found.compared)
     if not rows:
         return tag("div", diagram, ranked, class_="charts")
-    dots = dots_figure(rows, "auc", title="How well does a confidence rank pixels?")
+    dots = dots_figure(rows, "auc", title="How well does a confidence rank pixels?", width=6.5)
     areas = svg(dots, "Area under the error curve of each measure of confidence: its mean, and a dot a scene")
     return tag("div", diagram, areas, class_="charts") + ranked
 

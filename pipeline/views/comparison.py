@@ -16,7 +16,7 @@ _MARKED = (0.0, 0.5, 0.9, 0.99)
 """Values of R that are written beside the curve."""
 
 
-def dots_figure(rows: Sequence[Row], figure: str, *, title: str) -> Figure:
+def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 9.5) -> Figure:
     """Return a figure with a line a method: a dot a scene, and a bar at their mean.
 
     Args:
@@ -24,10 +24,11 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str) -> Figure:
             ``auc_optimal``, its mean is drawn as a line across.
         figure: the key that is drawn.
         title: stands above.
+        width: of the figure, inches.
     """
     methods = list(dict.fromkeys(row["method"] for row in rows))
     drawn = new_figure(title)
-    drawn.set_size_inches(9.5, 1.8 + 0.45 * len(methods))
+    drawn.set_size_inches(width, 1.8 + 0.45 * len(methods))
     axes = drawn.subplots()
     values = [[row[figure] for row in rows if row["method"] == method and figure in row] for method in methods]
     axes.barh(methods, [np.mean(each) for each in values], color=QUIET, label="mean")
