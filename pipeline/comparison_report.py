@@ -30,7 +30,7 @@ _TITLES = {
     "auc": "Confidence of the raw map: area under the error curve; lower is better",
 }
 _DENSITY = ("invalid", "bad", "bad_dual_cnn", "avgerr", "rms", "A50", "A90", "A95", "A99")
-_SHORT = {"invalid": "invalid %", "bad": "bad %", "bad_dual_cnn": "dual-cnn bad % there", "auc": "AUC"}
+_SHORT = {"invalid": "invalid %", "bad": "bad %", "bad_dual_cnn": "bad % of dual-cnn, same density", "auc": "AUC"}
 
 
 def as_json(found: Comparison, files: Iterable[Path] = ()) -> dict[str, Any]:
