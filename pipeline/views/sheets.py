@@ -57,7 +57,7 @@ def _sheet(found: "Comparison", scenes: list[str], title: str) -> Figure:
     rows = {scene: _pictures(products, found.R) for scene, products in arrays.items()}
     names = list(next(iter(rows.values())))
     height, width = next(iter(rows.values()))[names[0]].shape[:2]
-    drawn = new_figure(f"{title}: disparity, dark blue (far) to yellow (near), px beside; black: none")
+    drawn = new_figure(f"{title}; blue: far, yellow: near, black: no disparity")
     drawn.set_size_inches(_WIDTH * len(names) + 0.5, len(rows) * (_WIDTH * height / width + 0.1) + 0.6)
     panels = drawn.subplots(len(rows), len(names), squeeze=False)
     for panel_row, (scene, pictures) in zip(panels, rows.items(), strict=True):
