@@ -172,14 +172,14 @@ def _configuration(found: Gathered) -> Html:
 
 
 def _keys(found: Gathered) -> Html:
-    rows = [
-        [each.step.product, each.step.scene, found.entries[each.key].created[:19].replace("T", " "), each.key]
-        for each in found.hits
-        if each.key
-    ]
+    rows = [[each.step.product, each.step.scene, each.key, _made(found, each.key)] for each in found.hits if each.key]
     rows += [
-        [product, scene.name, found.entries[key].created[:19].replace("T", " "), key]
+        [product, scene.name, key, _made(found, key)]
         for scene in found.scenes
         for product, key in scene.baselines.items()
     ]
-    return table(["product", "scene", "made (UTC)", "key"], rows, caption="Where each product is in the cache", words=4)
+    return table(["product", "scene", "key", "made (UTC)"], rows, caption="Where each product is in the cache", words=3)
+
+
+def _made(found: Gathered, key: str) -> str:
+    return found.entries[key].created[:19].replace("T", " ")
