@@ -5,6 +5,7 @@ import io
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from rich.console import Console
@@ -119,9 +120,10 @@ def print_comparison(found: Comparison, masks: Iterable[str]) -> None:
     rows, means = _at(found.rows), _at(found.means)
     for experiment, figure in (("raw", "raw_bad"), ("auc", "auc")):
         if of(rows, experiment):
-            console.print(_by_scene(of(rows, experiment), of(means, experiment), experiment, figure), "")
+            table = _by_scene(of(rows, experiment), of(means, experiment), experiment, figure)
+            console.print(_fitted(table, console), "")
     if of(rows, "density"):
-        console.print(_density_table(of(means, "density")), "")
+        console.print(_fitted(_density_table(of(means, "density")), console), "")
     _print_quoted(console, _quoted(found))
     kinds = ", ".join(sorted(set(masks)))
     console.print()
@@ -154,6 +156,15 @@ def _density_table(means: Sequence[Row]) -> Table:
     for row in means:
         threshold = f"{row['R']:g}" if "R" in row else "-"
         table.add_row(escape(row["method"]), threshold, *(_cell(row, name) for name in _DENSITY))
+    return table
+
+
+def _fitted(table: Table, console: Console) -> Table:
+    """Return the table, its headings a few words a line if it is too wide for the console: words stay whole."""
+    if console.measure(table, options=console.options.update(width=1000)).maximum > console.width:
+        for column in table.columns:
+            words = str(column.header).split()
+            column.header = fill(" ".join(words), max(map(len, words)), break_on_hyphens=False)
     return table
 
 
