@@ -5,8 +5,9 @@ import io
 import pytest
 from rich.console import Console
 
-from pipeline.comparison import ABLATION, MATCHERS, OURS
+from pipeline.comparison import ABLATION, MATCHERS
 from pipeline.comparison_report import _by_scene, _fitted
+from pipeline.comparison_rows import OURS
 
 SCENES = ("Motorcycle", "MotorcycleE", "Piano", "PianoL", "Pipes", "Playroom", "Shelves", "Teddy")
 METHODS = (f"{OURS}, shipped weights", *MATCHERS, *ABLATION)
