@@ -41,8 +41,6 @@ app = typer.Typer(
 data_app = typer.Typer(help="Look at datasets.", no_args_is_help=True)
 app.add_typer(cache_app, name="cache")
 app.add_typer(data_app, name="data")
-cli_match.register(app)
-cli_compare.register(app)
 
 
 @app.command()
@@ -61,7 +59,7 @@ def run(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a dataset's products up to --upto, reusing all that is cached."""
+    """Make a dataset's products, reusing all that is cached."""
     from pipeline import api, console
     from pipeline.progress import ProgressWatch
 
@@ -95,7 +93,10 @@ def sweep(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Filter at many thresholds R, and over several values of any setting; say what was reused."""
+    """Filter at many thresholds R, and over other settings.
+
+    Says what was reused; --set section.field=value1,value2 tries several values of any setting.
+    """
     from pipeline import api, console
     from pipeline.progress import ProgressWatch
     from pipeline.sweep_report import print_sweep, write_sweep
@@ -124,7 +125,7 @@ def status(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Say of every product whether it is cached, and if not, what changed."""
+    """Say what is cached, and what changed if it is not."""
     from pipeline import api
 
     _print_plan(api.status(_task(dataset, scene, settings, config, train, cache), upto), as_json)
@@ -142,7 +143,10 @@ def explain(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what a product's key is made of, why it would be made again, and what it was made from."""
+    """Show what a product's key is made of.
+
+    Also why it would be made again, and what it was made from.
+    """
     from pipeline import api
     from pipeline.explanation import draw_provenance, explanation, print_explanation
 
@@ -172,7 +176,10 @@ def inspect(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show a cached product: its xarray, statistics, a picture, and how to open it in Python."""
+    """Show a cached product: its xarray, figures and picture.
+
+    Also how to open it in Python. A map is drawn in terminals that can show it.
+    """
     from pipeline import api
     from pipeline.inspect import draw, inspection, print_inspection
 
@@ -188,7 +195,7 @@ def data_list(
     dataset: Annotated[str | None, typer.Argument(help="List the scenes of this dataset.")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """List the datasets that can be named, or the scenes of one."""
+    """List the datasets there are, or the scenes of one."""
     from pipeline.datalist import list_datasets, list_scenes
 
     list_scenes(dataset, as_json) if dataset else list_datasets(as_json)
@@ -238,7 +245,8 @@ def _export(result: "Result", output: Path | None) -> list[Path]:
     return export(result, output)
 
 
-cli_view.register(app)
+for commands in (cli_match, cli_compare, cli_view):
+    commands.register(app)
 
 
 class _Stopped(BaseException):

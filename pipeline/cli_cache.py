@@ -22,7 +22,10 @@ def cache_ls(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """List the entries: product, scene, size, age, last use, the settings they belong to, key."""
+    """List the entries.
+
+    Product, scene, size, age, last use, the settings they belong to, key.
+    """
     from pipeline.cachetools import Selection, list_entries
 
     list_entries(cache, Selection(tuple(keys or ()), product, scene), as_json)
@@ -36,7 +39,10 @@ def cache_verify(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Read every byte of all entries, or of some, and compare it with what was published; 1 if one is damaged."""
+    """Compare every byte with what was published.
+
+    Of all entries, or of some; the exit code is 1 if one is damaged.
+    """
     from pipeline.cachetools import Selection, verify_entries
 
     if not verify_entries(cache, Selection(tuple(keys or ()), product, scene), as_json):
@@ -71,7 +77,10 @@ def cache_gc(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what can be deleted and why: leftovers always, entries by reach, age or size; delete with --yes."""
+    """Show what can be deleted and why; delete with --yes.
+
+    Leftovers always; entries by reach, age or size.
+    """
     from pipeline.cleaning import Wish, clean
 
     wish = Wish(tuple(keep or ()), tuple(config or ()), train, unused_for, max_size)
@@ -88,7 +97,7 @@ def cache_export(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write entries, each checked, into one file for a colleague."""
+    """Write entries, each checked, into one file to pass on."""
     from pipeline.cachetools import Selection
     from pipeline.exchange import export_archive
 
@@ -101,7 +110,10 @@ def cache_import(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Take over the entries of an archive: each is checked to the byte, and is there whole or not at all."""
+    """Take over the entries of an archive.
+
+    Each is checked to the byte, and is there whole or not at all.
+    """
     from pipeline.exchange import import_archive
 
     import_archive(cache, archive, as_json)
@@ -114,7 +126,10 @@ def cache_trace(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what an entry was made from, up to images, weights and code."""
+    """Show what an entry was made from.
+
+    Up to images, weights and code.
+    """
     from pipeline.exchange import trace
 
     trace(cache, key, graph, as_json)

@@ -43,7 +43,10 @@ def compare(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Set baselines beside the two networks: the paper's tables and figures."""
+    """Set other matchers beside the two networks.
+
+    The paper's experiments: raw maps, error at equal density, confidence measures.
+    """
     from pipeline import api, comparison, comparison_report, console
     from pipeline.progress import ProgressWatch
 

@@ -72,7 +72,10 @@ def match(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Match your own rectified pair, or many: disparities, confidence, depth and points as files."""
+    """Match your own rectified pair, or many.
+
+    Writes disparities, confidence and, with a calibration, depth and points as files.
+    """
     from datasets.pair import PairOptions, pair_spec
     from pipeline.api import Task
     from pipeline.pairs import Wishes
@@ -129,6 +132,8 @@ def _carry_out(
         return
     for each, about in zip(found, summaries, strict=True):
         _say(each, about)
+    if len(found) == 1:
+        _draw(found[0])
     print(console.reuse_line(_results(found)))
 
 
@@ -148,6 +153,18 @@ def _say(match: "Match", about: dict[str, Any]) -> None:
     for note in about["notes"]:
         print(f"  {note}")
     print(f"  wrote {len(about['files']) + 1} files to {about['folder']}; summary.json says what each holds")
+
+
+def _draw(match: "Match") -> None:
+    """Draw the map of a single pair, if stdout is a terminal that can show it."""
+    from rich.console import Console
+
+    from pipeline.terminal import can_draw, draw_picture
+
+    if can_draw(Console()):
+        from pipeline.views.small import small_disparity
+
+        draw_picture(*small_disparity(match.disparity))
 
 
 def _results(found: "Sequence[Match]") -> list[Any]:

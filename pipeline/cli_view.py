@@ -23,7 +23,10 @@ def report(
     train: Annotated[bool, typer.Option("--train", help="Of a run that trained the networks.")] = False,
     cache: CacheOption = None,
 ) -> None:
-    """Write one HTML file that shows all that is cached of a dataset: figures, curves, maps."""
+    """Write one HTML file of all that is cached of a dataset.
+
+    Figures, curves, maps, training and settings; it loads nothing and makes nothing.
+    """
     from pipeline.api import Task
     from pipeline.reporting import report as write
 
@@ -36,7 +39,10 @@ def view(
     show: Annotated[bool, typer.Option("--show/--no-show", help="Open the browser.")] = True,
     cache: CacheOption = None,
 ) -> None:
-    """Look into the cache in the browser: maps, confidence, threshold and cost curves together."""
+    """Look into the cache in the browser.
+
+    Maps, confidence, threshold and cost curves together, on a page served to this machine alone.
+    """
     from pipeline.viewer import view as serve
 
     serve(cache, port=port, show=show)

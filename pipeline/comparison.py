@@ -87,6 +87,11 @@ class Comparison:
         """The names of the scenes, in order."""
         return list(dict.fromkeys(row["scene"] for row in self.rows))
 
+    @property
+    def R(self) -> float | None:  # noqa: N802 - the paper's name
+        """The least confidence that our semi-dense map keeps; None where a density was asked for instead."""
+        return next(iter(_asked(self.result).values()))["semidense"].step.R
+
     def arrays(self, scene: str) -> dict[str, Arrays]:
         """Return the arrays of every product of a scene that was asked for, in memory."""
         return _read(self.result, _asked(self.result)[scene])
@@ -207,16 +212,39 @@ def _raw(judged: Judged, products: Mapping[str, Arrays], _: float | None) -> Ite
 
 
 def _density(judged: Judged, products: Mapping[str, Arrays], R: float | None) -> Iterator[Row]:
-    ours: dict[str, NDArray[np.float32]] = {name: products[name][name] for name in ("disparity", "confidence")}
     yield from (row | {"R": R} for row in density_rows(judged, OURS, products["semidense"]["disparity"]))
+    yield from matcher_rows(judged, products)
+    yield from curve_rows(judged, _ours(products))
+
+
+def _ours(products: Mapping[str, Arrays]) -> dict[str, NDArray[np.float32]]:
+    return {name: products[name][name] for name in ("disparity", "confidence")}
+
+
+def matcher_rows(judged: Judged, products: Mapping[str, Arrays]) -> Iterator[Row]:
+    """Yield what the other matchers' semi-dense maps do, and our error at the density of each.
+
+    Args:
+        judged: the scene.
+        products: ``disparity``, ``confidence`` and those of the matchers that are there, by name.
+    """
     for method, product in MATCHERS.items():
         if product in products:
             rows = density_rows(judged, method, products[product]["disparity"])
-            yield from equal_density(rows, judged, ours)
-    yield from curve_rows(judged, ours)
+            yield from equal_density(rows, judged, _ours(products))
 
 
 def _auc(judged: Judged, products: Mapping[str, Arrays], _: float | None) -> Iterator[Row]:
+    yield from measure_rows(judged, products)
+
+
+def measure_rows(judged: Judged, products: Mapping[str, Arrays]) -> Iterator[Row]:
+    """Yield the area under the error curve of each confidence measure of the raw map.
+
+    Args:
+        judged: the scene.
+        products: ``disparity`` and those of the measures that are there, by name.
+    """
     for method, (product, array) in MEASURES.items():
         if product in products:
             yield from auc_rows(judged, method, products[product][array], products["disparity"]["disparity"])

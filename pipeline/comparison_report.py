@@ -5,6 +5,7 @@ import io
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from rich.console import Console
@@ -30,7 +31,7 @@ _TITLES = {
     "auc": "Confidence of the raw map: area under the error curve; lower is better",
 }
 _DENSITY = ("invalid", "bad", "bad_dual_cnn", "avgerr", "rms", "A50", "A90", "A95", "A99")
-_SHORT = {"invalid": "invalid %", "bad": "bad %", "bad_dual_cnn": "bad % of dual-cnn there", "auc": "AUC"}
+_SHORT = {"invalid": "invalid %", "bad": "bad %", "bad_dual_cnn": "bad % of dual-cnn, same density", "auc": "AUC"}
 
 
 def as_json(found: Comparison, files: Iterable[Path] = ()) -> dict[str, Any]:
@@ -119,11 +120,13 @@ def print_comparison(found: Comparison, masks: Iterable[str]) -> None:
     rows, means = _at(found.rows), _at(found.means)
     for experiment, figure in (("raw", "raw_bad"), ("auc", "auc")):
         if of(rows, experiment):
-            console.print(_by_scene(of(rows, experiment), of(means, experiment), experiment, figure))
+            table = _by_scene(of(rows, experiment), of(means, experiment), experiment, figure)
+            console.print(_fitted(table, console), "")
     if of(rows, "density"):
-        console.print(_density_table(of(means, "density")))
+        console.print(_fitted(_density_table(of(means, "density")), console), "")
     _print_quoted(console, _quoted(found))
     kinds = ", ".join(sorted(set(masks)))
+    console.print()
     text = f"mask: {MASK} ({kinds}); wrong: off by more than {THRESHOLD:g} px of the image at hand"
     console.print(text, style="dim", highlight=False)
     for reason in dict.fromkeys(each["why"] for each in found.unavailable):
@@ -132,16 +135,17 @@ def print_comparison(found: Comparison, masks: Iterable[str]) -> None:
 
 
 def _by_scene(rows: Sequence[Row], means: Sequence[Row], experiment: str, figure: str) -> Table:
-    """Return a table with a row a method and a column a scene."""
-    scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    table = _table(_TITLES[experiment], "method", *scenes, "mean")
-    cells = {(row["method"], row["scene"]): row for row in rows}
-    methods = [(row["method"], figure, row) for row in means]
+    """Return a table with a row a scene and a column a method."""
+    columns = {row["method"]: (row["method"], figure) for row in means}
     if experiment == "auc":
-        methods.append(("optimal", "auc_optimal", means[0]))
-    for method, shown, mean in methods:
-        of_scenes = [cells.get((mean["method"], scene), {}) for scene in scenes]
-        table.add_row(escape(method), *(_cell(row, shown) for row in [*of_scenes, mean]))
+        columns["optimal"] = (means[0]["method"], "auc_optimal")
+    table = _table(_TITLES[experiment], "scene", *columns)
+    cells = {(row["scene"], row["method"]): row for row in rows}
+    of_mean = {row["method"]: row for row in means}
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        shown = (_cell(cells.get((scene, method), {}), name) for method, name in columns.values())
+        table.add_row(escape(scene), *shown)
+    table.add_row("mean", *(_cell(of_mean[method], name) for method, name in columns.values()))
     return table
 
 
@@ -155,12 +159,26 @@ def _density_table(means: Sequence[Row]) -> Table:
     return table
 
 
+def _fitted(table: Table, console: Console) -> Table:
+    """Return the table, its headings a few words a line if it is too wide for the console: words stay whole."""
+    if console.measure(table, options=console.options.update(width=1000)).maximum > console.width:
+        for column in table.columns:
+            words = str(column.header).split()
+            column.header = fill(" ".join(words), max(map(len, words)), break_on_hyphens=False)
+    return table
+
+
 def _print_quoted(console: Console, quoted: Sequence[Row]) -> None:
-    table = _table("Quoted from the paper: other data, another resolution", "method", "figure", "value", "on")
+    """Print the paper's figures, those of the same data together."""
+    console.print("Quoted from the paper: other data, another resolution", style="italic")
+    groups: dict[tuple[str, str], list[Row]] = {}
     for row in quoted:
         (figure,) = (name for name in FIGURES if name in row)
-        table.add_row(row["method"], _SHORT.get(figure, figure), _cell(row, figure), row["data"])
-    console.print(table)
+        groups.setdefault((figure, row["data"]), []).append(row)
+    for (figure, data), rows in groups.items():
+        values = ", ".join(f"{row['method']} {_cell(row, figure)}" for row in rows)
+        console.print(f"{_SHORT.get(figure, figure)}, {data}:", style="dim", markup=False)
+        console.print(f"  {values}", markup=False)
 
 
 def _table(title: str, *columns: str) -> Table:

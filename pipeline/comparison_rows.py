@@ -1,6 +1,6 @@
 """The figures of a comparison: what one map, or one confidence, does on one scene."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,18 +37,28 @@ class Judged:
     Attributes:
         scene: its name.
         truth: the product ``truth``.
+        masks: those that figures are wanted for, of ``MASKS``.
+        thresholds: px, those that figures are wanted for.
     """
 
     scene: str
     truth: Arrays
+    masks: Sequence[str] = MASKS
+    thresholds: Sequence[float] = THRESHOLDS
 
     def rows(self, experiment: str, method: str) -> Iterator[tuple[Row, Mask, float]]:
         """Yield the start of a row, its mask and its threshold, for each mask and threshold."""
-        for mask, pixels in zip(MASKS, (self.truth["nonocc"], np.ones(self.disparity.shape, bool)), strict=True):
+        for mask in self.masks:
+            pixels = self.pixels(mask)
             counts = int(counted(self.disparity, pixels).sum())
-            for threshold in THRESHOLDS:
+            for threshold in self.thresholds:
                 named = {"experiment": experiment, "scene": self.scene, "method": method, "mask": mask}
                 yield named | {"threshold_px": threshold, "pixels": counts}, pixels, threshold
+
+    def pixels(self, mask: str) -> Mask:
+        """Return the pixels (y, x) of a mask, whether their truth is known or not."""
+        chosen: Mask = self.truth["nonocc"] if mask == "nonocc" else np.ones(self.disparity.shape, bool)
+        return chosen
 
     @property
     def disparity(self) -> NDArray[np.float32]:
@@ -78,9 +88,8 @@ def density_rows(judged: Judged, method: str, reported: NDArray[np.float32]) -> 
 
 def equal_density(rows: Iterator[Row], judged: Judged, ours: Mapping[str, NDArray[np.float32]]) -> Iterator[Row]:
     """Yield rows with the error of our map at the density of each; ``ours`` has ``disparity`` and ``confidence``."""
-    masks = dict(zip(MASKS, (judged.truth["nonocc"], np.ones(judged.disparity.shape, bool)), strict=True))
     for row in rows:
-        chosen = counted(judged.disparity, masks[row["mask"]])
+        chosen = counted(judged.disparity, judged.pixels(row["mask"]))
         correct = np.abs(ours["disparity"] - judged.disparity)[chosen] <= row["threshold_px"]
         density = 1 - row["invalid"] / 100 if "invalid" in row else 0
         figure = error_at_density(ours["confidence"][chosen], correct, density) if density > 0 else float("nan")
@@ -99,11 +108,14 @@ def auc_rows(
     judged: Judged, method: str, confidence: NDArray[np.float32], disparity: NDArray[np.float32]
 ) -> Iterator[Row]:
     """Yield the area under the error curve of a confidence of a raw map, and the area of a perfect one."""
+    rankings: dict[str, Ranking] = {}  # sorting is what takes time, and all thresholds share it
     for row, mask, threshold in judged.rows("auc", method):
         chosen = counted(judged.disparity, mask)
+        if row["mask"] not in rankings:
+            rankings[row["mask"]] = Ranking.of(confidence[chosen])
         correct = np.abs(disparity - judged.disparity)[chosen] <= threshold
         error_rate = float(np.mean(~correct)) if correct.size else float("nan")
-        auc = Ranking.of(confidence[chosen]).auc(correct)
+        auc = rankings[row["mask"]].auc(correct)
         yield row | _known({"raw_bad": 100 * error_rate, "auc": auc, "auc_optimal": optimal_auc(error_rate)})
 
 

@@ -19,7 +19,7 @@ STYLES = {"hit": "green", "made": "cyan", "stale": "yellow", "missing": "dim"}
 
 def results() -> Console:
     """Return the console for results: as wide as the terminal, wide enough for any table elsewhere."""
-    return Console(highlight=False) if Console().is_terminal else Console(highlight=False, width=200)
+    return Console(highlight=False) if Console().is_terminal else Console(highlight=False, width=240)
 
 
 def print_json(value: Mapping[str, Any]) -> None:

@@ -42,7 +42,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]], *, caption: str
         tag("tr", *(tag("th" if i == 0 else "td", text(each), class_=kind) for i, (kind, each) in enumerate(row)))
         for row in cells[1:]
     )
-    inner = tag("caption", text(caption)) + tag("thead", tag("tr", titles)) + tag("tbody", body)
+    inner = tag("caption", tag("span", text(caption))) + tag("thead", tag("tr", titles)) + tag("tbody", body)
     return tag("div", tag("table", inner), class_="scroll", tabindex=0, role="region", aria_label=caption)
 
 

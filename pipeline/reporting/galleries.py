@@ -1,6 +1,7 @@
 """The pictures of a scene side by side, which zoom and move together."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -55,7 +56,8 @@ def _pictures(maps: SceneMaps, thresholds: tuple[float, ...]) -> Iterator[Pictur
     yield confidence_picture("confidence", maps.confidence)
     for R in thresholds:
         kept = keep_confident(maps.disparity, maps.confidence, R)
-        yield disparity_picture(f"kept at R = {R:g}{_told(maps.tally, R)}", kept, span, "not kept")
+        picture = disparity_picture(f"kept at R = {R:g}", kept, span, "not kept")
+        yield replace(picture, legend=picture.legend + _told(maps.tally, R))
 
 
 def _span(maps: SceneMaps) -> tuple[float, float]:
@@ -64,7 +66,9 @@ def _span(maps: SceneMaps) -> tuple[float, float]:
     return disparity_span(np.concatenate(known)) if known else (0, 1)
 
 
-def _told(tally: Tally | None, R: float) -> str:
+def _told(tally: Tally | None, R: float) -> Html:
     """Return the error of what is kept, which belongs to the picture; nothing without a truth."""
     rows = [row for row in tally.rows("", "nonocc", 1.0) if row["R"] == R and "bad" in row] if tally else []
-    return f": {rows[0]['bad']:.1f} % of it wrong by more than 1 px" if rows else ""
+    return (
+        tag("span", text(f"{rows[0]['bad']:.1f} % of the kept nonocc pixels wrong by more than 1 px")) if rows else ""
+    )

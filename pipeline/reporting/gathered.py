@@ -10,19 +10,31 @@ from pipeline.api import METHOD, Task, open_store, status
 from pipeline.errors import UsageError
 from pipeline.lineage import lineage
 from pipeline.plan import Plan, Planned
+from pipeline.reporting.baselines import cached_baselines, compared_rows
 from pipeline.steps import SPLIT
 from pipeline.tasks import read_arrays
 from pipeline.views.scene_maps import SceneMaps
 from stages.metrics import metric_rows
 
+MASK, THRESHOLD_PX = "nonocc", 1.0
+"""Mask, and error in px of the image at hand, of the tables and curves that stand first."""
+
 
 @dataclass(frozen=True, eq=False)
 class GatheredScene:
-    """A scene and its steps that are cached, by product."""
+    """A scene and what of it is cached.
+
+    Attributes:
+        name: its name.
+        steps: the steps that are cached, by product.
+        store: the cache.
+        baselines: keys of the other matchers and confidence measures that are cached, by product.
+    """
 
     name: str
     steps: Mapping[str, Planned]
     store: Store
+    baselines: Mapping[str, str]
 
     @property
     def keys(self) -> dict[str, str]:
@@ -42,6 +54,11 @@ class GatheredScene:
         return metric_rows(
             self.name, METHOD, self.steps["metrics"].step.R, read_arrays(self.store, self.keys["metrics"])
         )
+
+    @cached_property
+    def compared(self) -> list[dict[str, Any]]:
+        """The rows of the comparison with the baselines that are cached, at ``MASK`` and ``THRESHOLD_PX``."""
+        return compared_rows(self.name, {**self.keys, **self.baselines}, self.store, [MASK], [THRESHOLD_PX])
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +86,10 @@ class Gathered:
 
     @cached_property
     def entries(self) -> dict[str, Entry]:
-        """The records of what is cached, by key."""
-        return {planned.key: self.store.require(planned.key) for planned in self.hits if planned.key}
+        """The records of what is cached, by key; baselines too."""
+        keys = [planned.key for planned in self.hits if planned.key]
+        keys += [key for scene in self.scenes for key in scene.baselines.values()]
+        return {key: self.store.require(key) for key in keys}
 
     @cached_property
     def networks(self) -> dict[str, Planned]:
@@ -84,6 +103,11 @@ class Gathered:
         """The rows of the figures of all scenes."""
         return [row for scene in self.scenes for row in scene.rows]
 
+    @property
+    def compared(self) -> list[dict[str, Any]]:
+        """The rows of the comparison of all scenes."""
+        return [row for scene in self.scenes for row in scene.compared]
+
 
 def gather(task: Task) -> Gathered:
     """Look up what a run of ``task`` up to the metrics would find in the cache. Nothing is made.
@@ -92,15 +116,18 @@ def gather(task: Task) -> Gathered:
         UsageError: if nothing of any scene is cached, with the command that makes it.
     """
     store, plan = open_store(task.cache), status(task)
+    request = task.request("metrics")
+    baselines = cached_baselines(request, store)
     by_id = {planned.step.id: planned for planned in plan.steps}
     scenes = []
     for target, _ in plan.targets:
         steps = {step.product: by_id[step.id] for step in lineage(by_id, target) if by_id[step.id].state == "hit"}
         if {planned.step.scene for planned in steps.values()} - {SPLIT}:
-            scenes.append(GatheredScene(by_id[target].step.scene, steps, store))
+            name = by_id[target].step.scene
+            scenes.append(GatheredScene(name, steps, store, baselines.get(name, {})))
     if not scenes:
         raise UsageError(
             f"nothing of {task.dataset} is cached in {store.root}: make it with `pipeline run {task.dataset}`"
         )
-    config = next(iter(task.request("metrics").configs.values()))
+    config = next(iter(request.configs.values()))
     return Gathered(task, plan, store, tuple(scenes), config.semidense.R)

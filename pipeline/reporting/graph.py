@@ -52,6 +52,19 @@ def done(found: Gathered) -> dict[str, Done]:
     return {product: counts[product] for product in ALL_PRODUCTS if product in counts}
 
 
+def done_beside(found: Gathered) -> dict[str, Done]:
+    """Return what was found of each baseline that is cached for some scene."""
+    counts: dict[str, Done] = {}
+    for scene in found.scenes:
+        for product, key in scene.baselines.items():
+            entry = found.entries[key]
+            before = counts.get(product, Done(0, len(found.scenes), 0.0, 0))
+            counts[product] = Done(
+                before.cached + 1, before.wanted, before.seconds + entry.seconds, before.size + entry.size
+            )
+    return {product: counts[product] for product in ALL_PRODUCTS if product in counts}
+
+
 def steps_table(found: Gathered) -> Html:
     """Return a row a product: how many of them are cached, how long they took to make, how large they are."""
     rows = [
@@ -61,7 +74,7 @@ def steps_table(found: Gathered) -> Html:
             _duration(each.seconds),
             bytes_text(each.size) if each.size else "-",
         ]
-        for product, each in done(found).items()
+        for product, each in (done(found) | done_beside(found)).items()
     ]
     return table(["product", "cached", "made in", "size"], rows, caption="What is cached, and what making it took")
 

@@ -12,6 +12,7 @@ from pipeline.reporting.gathered import Gathered
 from pipeline.reporting.pictures import svg
 from pipeline.shipped import weights_file
 from pipeline.views.figures import figure
+from pipeline.views.networks import loss_name
 
 
 def networks(found: Gathered) -> Html:
@@ -30,7 +31,8 @@ def _shipped(product: str) -> Html:
     """Return what the package says of its own weights: they were trained elsewhere, and bring no curve."""
     about = _metadata(product)
     steps = f", trained in {about['steps']:,} steps" if "steps" in about else ""
-    loss = f" to a final loss of {about['loss']:.3f} (class-balanced cross-entropy, nats)" if "loss" in about else ""
+    name = loss_name(about.get("configuration", {}).get(product, {}))
+    loss = f" to a final loss of {about['loss']:.3f} ({name}, nats)" if "loss" in about else ""
     told = tag("p", text(f"{product}: the weights that come with the package{steps}{loss}."))
     parts = about.get("configuration", {}).items()
     settings = [[f"{part}.{name}", value] for part, fields in parts for name, value in fields.items()]

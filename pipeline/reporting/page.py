@@ -9,13 +9,14 @@ from typing import Any
 
 from pipeline.console import mean_rows
 from pipeline.markup import Html, folded, table, tag, text
-from pipeline.reporting.figures_tables import THRESHOLD_PX, auc_table, metrics_tables
+from pipeline.reporting.figures_tables import auc_table, matcher_points, matchers_table, measure_points, metrics_tables
 from pipeline.reporting.galleries import gallery
-from pipeline.reporting.gathered import Gathered
+from pipeline.reporting.gathered import MASK, THRESHOLD_PX, Gathered
 from pipeline.reporting.graph import graph, steps_table
 from pipeline.reporting.networks import networks
 from pipeline.reporting.pictures import svg
 from pipeline.tasks import provenance
+from pipeline.views.comparison import dots_figure
 from pipeline.views.curves import error_curve_figure
 from pipeline.views.reliability import reliability, reliability_figure
 from pipeline.views.tally import Tally
@@ -61,7 +62,7 @@ def _title(found: Gathered) -> Iterator[Html]:
 
 def _cards(found: Gathered) -> Html:
     """Return the figures that one looks for first."""
-    rows = [row for row in found.rows if row["mask"] == "nonocc" and row["threshold_px"] == THRESHOLD_PX]
+    rows = [row for row in found.rows if row["mask"] == MASK and row["threshold_px"] == THRESHOLD_PX]
     count = len(found.scenes)
     cards = [(str(count), "scenes with something cached" if count > 1 else f"scene: {found.scenes[0].name}")]
     if rows:
@@ -101,7 +102,9 @@ def _parts(found: Gathered) -> Iterator[tuple[str, Html]]:
 
 def _what_ran(found: Gathered) -> Html:
     hits = len(found.hits)
+    beside = sum(len(scene.baselines) for scene in found.scenes)
     told = f"{hits} of {len(found.plan.steps)} products are cached. What is missing is left out below."
+    told += f" For comparison, {beside} products of other methods are cached." if beside else ""
     notes = "".join(tag("li", text(note)) for note in found.plan.notes)
     return (
         tag("p", text(told)) + graph(found) + steps_table(found) + (tag("ul", notes, class_="quiet") if notes else "")
@@ -127,7 +130,10 @@ def _curves(found: Gathered) -> Html:
     if not chosen:
         return ""
     drawn = error_curve_figure(
-        chosen, title="What a threshold on the confidence buys, and what it costs", threshold=THRESHOLD_PX
+        chosen,
+        title="What a threshold on the confidence buys, and what it costs",
+        threshold=THRESHOLD_PX,
+        others=matcher_points(found.compared, len(_tallies(found))),
     )
     rows_told = [
         [f"{row['R']:g}", f"{row['invalid']:.1f}", f"{row['bad']:.2f}"] for row in (mean_rows(chosen) or chosen)
@@ -135,20 +141,23 @@ def _curves(found: Gathered) -> Html:
     figures = table(
         ["R", "invalid (%)", "error of kept (%)"], rows_told, caption="The mean of the scenes, point by point"
     )
-    return svg(drawn, "Error of the kept pixels against the share of invalid ones, for each threshold R") + folded(
-        "As numbers", figures
-    )
+    told = svg(drawn, "Error of the kept pixels against the share of invalid ones, for each threshold R")
+    return told + folded("As numbers", figures) + matchers_table(found.compared)
 
 
 def _confidence(found: Gathered) -> Html:
-    ranked = auc_table(found.rows) if any("auc" in row for row in found.rows) else ""
+    ranked = auc_table(found.compared)
     tallies = [tally for _, tally in _tallies(found)]
     if not tallies:
         return ranked
     drawn = reliability_figure(reliability(tallies), title="Is the confidence a probability?")
-    return tag(
-        "div", svg(drawn, "Reliability: share of right pixels against their confidence"), ranked, class_="charts"
-    )
+    diagram = svg(drawn, "Reliability: share of right pixels against their confidence")
+    rows = measure_points(found.compared)
+    if not rows:
+        return tag("div", diagram, ranked, class_="charts")
+    dots = dots_figure(rows, "auc", title="How well does a confidence rank pixels?", width=6.5)
+    areas = svg(dots, "Area under the error curve of each measure of confidence: its mean, and a dot a scene")
+    return tag("div", diagram, areas, class_="charts") + ranked
 
 
 def _configuration(found: Gathered) -> Html:
@@ -163,9 +172,14 @@ def _configuration(found: Gathered) -> Html:
 
 
 def _keys(found: Gathered) -> Html:
-    rows = [
-        [each.step.product, each.step.scene, found.entries[each.key].created[:19].replace("T", " "), each.key]
-        for each in found.hits
-        if each.key
+    rows = [[each.step.product, each.step.scene, each.key, _made(found, each.key)] for each in found.hits if each.key]
+    rows += [
+        [product, scene.name, key, _made(found, key)]
+        for scene in found.scenes
+        for product, key in scene.baselines.items()
     ]
-    return table(["product", "scene", "made (UTC)", "key"], rows, caption="Where each product is in the cache", words=4)
+    return table(["product", "scene", "key", "made (UTC)"], rows, caption="Where each product is in the cache", words=3)
+
+
+def _made(found: Gathered, key: str) -> str:
+    return found.entries[key].created[:19].replace("T", " ")

@@ -13,10 +13,16 @@ from PIL import Image
 
 from pipeline.legends import confidence_legend, disparity_legend, error_legend
 from pipeline.markup import Html, tag, text
-from pipeline.views.colours import BLUE, NONE, confidence_colours, disparity_colours
+from pipeline.views.colours import BLUE, NONE, QUIET, SKY, confidence_colours, disparity_colours
 from pipeline.views.errors import ERROR_COLOURS, UNKNOWN, error_classes
 
-_OWN = {"#000000": "currentColor", "#ffffff": "var(--paper)", BLUE.lower(): "var(--blue)"}
+_OWN = {
+    "#000000": "currentColor",
+    "#ffffff": "var(--paper)",
+    BLUE.lower(): "var(--blue)",
+    SKY.lower(): "var(--sky)",
+    QUIET.lower(): "var(--back)",
+}
 """Colours of charts, and those of the page that they become."""
 _LEVELS = 254
 """Colours of a map, beside those of none and of unknown."""
@@ -105,4 +111,4 @@ def svg(figure: Any, label: str) -> Html:  # noqa: ANN401
     drawing = file.getvalue().decode("utf-8").partition("<svg")[2]
     for colour, own in _OWN.items():
         drawing = drawing.replace(colour, own)
-    return tag("figure", f'<svg role="img" aria-label="{text(label)}"{drawing}', class_="chart")
+    return tag("figure", f'<svg role="img" aria-label="{text(label)}"{drawing}', class_="chart", tabindex=0)

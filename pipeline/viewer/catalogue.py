@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cache import Entry, Store
+from pipeline.steps import SPLIT
 
 _ENDS = ("confidence", "disparity")
 """Products that a configuration ends with."""
@@ -23,10 +24,12 @@ class Configuration:
     Attributes:
         name: what sets it apart from the others of the scene, and when it was made.
         entries: its products, by name; the truth among them, if it is known.
+        further: what was made from them, the first first: filtered maps, figures, other matchers and measures.
     """
 
     name: str
     entries: Mapping[str, Entry]
+    further: tuple[Entry, ...]
 
     @property
     def keys(self) -> dict[str, str]:
@@ -63,7 +66,7 @@ def catalogue(store: Store) -> tuple[CatalogueScene, ...]:
         pair = chain["images"].digest if "images" in chain else ""
         scenes.setdefault((label.get("dataset", ""), label.get("scene", ""), pair), []).append(chain)
     numbered = _numbered(scenes)
-    return tuple(CatalogueScene(*numbered[place], _named(chains)) for place, chains in sorted(scenes.items()))
+    return tuple(CatalogueScene(*numbered[place], _named(chains, records)) for place, chains in sorted(scenes.items()))
 
 
 def _numbered(places: Iterable[tuple[str, str, str]]) -> dict[tuple[str, str, str], tuple[str, str]]:
@@ -82,6 +85,10 @@ class _Records:
     def __init__(self, entries: Iterable[Entry]) -> None:
         self.entries = list(entries)
         self.by_content = {(entry.recipe.stage, entry.digest): entry for entry in self.entries}
+        self.made_from: dict[tuple[str, str], list[Entry]] = {}
+        for entry in self.entries:
+            for place in _places(entry):
+                self.made_from.setdefault(place, []).append(entry)
         self.truths = dict(self._truths())
 
     def _truths(self) -> Iterator[tuple[str, str]]:
@@ -114,9 +121,34 @@ class _Records:
                 self.above(found, name, content)
         return found
 
+    def further(self, chain: Chain) -> tuple[Entry, ...]:
+        """Return what was made from the products of a scene and from nothing else but of all training scenes."""
+        known = {(product, entry.digest) for product, entry in chain.items()}
+        found: dict[str, Entry] = {}
+        waiting = [place for place in known if not self._is_learnt(place)]
+        for place in waiting:
+            for entry in self.made_from.get(place, ()):
+                own = (entry.recipe.stage, entry.digest)
+                if entry.recipe.stage in (*chain, *_ENDS) or entry.key in found:
+                    continue
+                if all(each in known or self._is_learnt(each) for each in _places(entry)):
+                    found[entry.key] = entry
+                    known.add(own)
+                    waiting.append(own)
+        return tuple(sorted(found.values(), key=lambda entry: entry.created))
+
+    def _is_learnt(self, place: tuple[str, str]) -> bool:
+        entry = self.by_content.get(place)
+        return entry is not None and entry.label.get("scene") == SPLIT
+
     def _with_truth(self, chain: Chain) -> Chain:
         images = chain.get("images")
         return self.above(chain, "truth", self.truths.get(images.digest, "")) if images else chain
+
+
+def _places(entry: Entry) -> list[tuple[str, str]]:
+    """Return product and digest of each single product that an entry was made from."""
+    return [(product, content) for product, content in entry.recipe.inputs.items() if isinstance(content, str)]
 
 
 def _pairs(inputs: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -128,7 +160,7 @@ def _pairs(inputs: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield from zip(disparity, truth, strict=False)
 
 
-def _named(chains: list[Chain]) -> tuple[Configuration, ...]:
+def _named(chains: list[Chain], records: _Records) -> tuple[Configuration, ...]:
     """Name each configuration by the settings that not all share, and by the time it was made."""
     latest = sorted(chains, key=lambda chain: max(entry.created for entry in chain.values()), reverse=True)
     settings = [dict(_settings(chain)) for chain in latest]
@@ -137,7 +169,9 @@ def _named(chains: list[Chain]) -> tuple[Configuration, ...]:
         if len({each.get(name) for each in settings}) > 1
     ]  # fmt: skip
     return tuple(
-        Configuration(_name(chain, {name: each[name] for name in differing if name in each}), chain)
+        Configuration(
+            _name(chain, {name: each[name] for name in differing if name in each}), chain, records.further(chain)
+        )
         for chain, each in zip(latest, settings, strict=True)
     )
 

@@ -92,7 +92,7 @@ class Controls:
 
 def _select(title: str, options: list[str] | None = None, value: str = "") -> Select:
     name = title.partition(" ")[0]
-    width = {"configuration": 290, "compare": 220, "pixels": 120, "wrong": 120}.get(name, 150)
+    width = {"configuration": 290, "compare": 220, "pixels": 120, "wrong": 120, "dataset": 190}.get(name, 150)
     return Select(title=title, options=options or [], value=value, name=name, width=width, margin=0)
 
 

@@ -33,8 +33,8 @@ h3 { font-size: .95rem; margin: 0 0 .25rem; color: #1b1f24; } h3 small { font-we
 .fact b { color: #1b1f24; font-size: .95rem; font-variant-numeric: tabular-nums; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; } caption { text-align: left; color: #57606a; }
 th, td { padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #d0d7de; }
-.number { text-align: right; } .scroll { overflow-x: auto; } pre { overflow-x: auto; background: #f3f5f8;
-  padding: .6rem; }
+.number { text-align: right; white-space: nowrap; } .scroll { overflow-x: auto; }
+pre { overflow-x: auto; background: #f3f5f8; padding: .6rem; }
 summary { cursor: pointer; color: #0072b2; }
 """
 WIDE = ":host { grid-column: span 2; } @media (max-width: 44rem) { :host { grid-column: auto; } }"

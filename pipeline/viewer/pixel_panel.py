@@ -102,8 +102,14 @@ def show_evaluation(
     side = float(EVALUATION_PATCH)
     panels.seen.visible = True
     for source, column, patch, x, label in (
-        (sources.gray, "gray", (gray / 255).astype(np.float32), 0.0, "left view, gray"),
-        (sources.seen, "disparity", seen, side + 6, "raw disparity"),
+        (
+            sources.gray,
+            "gray",
+            (gray / 255).astype(np.float32),
+            0.0,
+            f"left view, gray, {EVALUATION_PATCH} x {EVALUATION_PATCH} px",
+        ),
+        (sources.seen, "disparity", seen, side + 6, "raw disparity, same place"),
     ):
         place = {"x": [x], "y": [10.0], "dw": [side], "dh": [side], "mx": [x + side / 2], "my": [10 + side / 2]}
         source.data = {column: [patch], **place, "side": [5.0], "label": [label]}

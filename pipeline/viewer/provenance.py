@@ -24,7 +24,25 @@ def provenance_table(chosen: Configuration, store: Store) -> Html:
     ]
     head = ["product", "size", "made in", "made (UTC)", "key"]
     listed = table(head, rows, caption="The products of this configuration")
-    return listed + "".join(folded(product, _record(entry, store)) for product, entry in products)
+    records = "".join(folded(product, _record(entry, store)) for product, entry in products)
+    return listed + records + (_further(chosen) if chosen.further else "")
+
+
+def _further(chosen: Configuration) -> Html:
+    rows = [
+        [
+            entry.recipe.stage,
+            ", ".join(f"{name} {_short(value)}" for name, value in entry.recipe.params.items() if name != "tiles")[:80],
+            bytes_text(entry.size),
+            f"{entry.seconds:.3g} s",
+            entry.created[:19].replace("T", " "),
+            entry.key[:12],
+        ]
+        for entry in chosen.further
+    ]
+    head = ["product", "settings", "size", "made in", "made (UTC)", "key"]
+    told = table(head, rows, caption="`pipeline cache trace KEY` tells where one comes from", words=2)
+    return folded(f"made from these: {len(rows)}", told)
 
 
 def _record(entry: Entry, store: Store) -> Html:

@@ -173,9 +173,12 @@ class Session:
         for name, (title, legend) in titles.items():
             self.panels.maps[name].title.text = tag("h3", text(title))
             self.panels.maps[name].legend.text = legend
-        self.panels.swiped.legend.text = "<br>".join(
-            (disparity_legend(span, "none"), error_legend(), confidence_legend())
-        )
+        legends = {
+            "disparity": disparity_legend(span, "none"),
+            "error": error_legend(),
+            "confidence": confidence_legend(),
+        }
+        self.panels.swiped.legend.text = "<br>".join(f"{text(name)}: {legend}" for name, legend in legends.items())
         height, width = maps.size
         every = f"; every {maps.step}. row and column shown" if maps.step > 1 else ""
         mask = f"; mask nonocc: {maps.mask_kind}" if maps.mask_kind else ""

@@ -1,23 +1,22 @@
 """Figures of a comparison: a dot a scene and method, and error against invalid pixels."""
 
 from collections.abc import Mapping, Sequence
-from itertools import cycle
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from pipeline.views.colours import BLUE, LINES, QUIET, RED
+from pipeline.views.colours import BLUE, QUIET, RED
+from pipeline.views.curves import draw_matchers
 from pipeline.views.panels import new_figure
 
 Row = Mapping[str, Any]
-_MARKERS = "osD^vPX*"
 _UNITS = {"raw_bad": "wrong or unreported pixels (%)", "auc": "area under the error curve (1)"}
 _MARKED = (0.0, 0.5, 0.9, 0.99)
 """Values of R that are written beside the curve."""
 
 
-def dots_figure(rows: Sequence[Row], figure: str, *, title: str) -> Figure:
+def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 9.5) -> Figure:
     """Return a figure with a line a method: a dot a scene, and a bar at their mean.
 
     Args:
@@ -25,10 +24,11 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str) -> Figure:
             ``auc_optimal``, its mean is drawn as a line across.
         figure: the key that is drawn.
         title: stands above.
+        width: of the figure, inches.
     """
     methods = list(dict.fromkeys(row["method"] for row in rows))
     drawn = new_figure(title)
-    drawn.set_size_inches(9.5, 1.8 + 0.45 * len(methods))
+    drawn.set_size_inches(width, 1.8 + 0.45 * len(methods))
     axes = drawn.subplots()
     values = [[row[figure] for row in rows if row["method"] == method and figure in row] for method in methods]
     axes.barh(methods, [np.mean(each) for each in values], color=QUIET, label="mean")
@@ -68,8 +68,7 @@ def density_figure(means: Sequence[Row]) -> Figure:
             axes.plot(*place, ".", color=BLUE, markersize=9)
             axes.annotate(f"R = {row['R']:g}", place, xytext=(6, 6), textcoords="offset points", fontsize="small")
     others = [row for row in means if row["experiment"] == "density" and "bad" in row and "R" not in row]
-    for row, marker, colour in zip(others, cycle(_MARKERS), cycle(LINES[1:]), strict=False):
-        axes.plot(row["invalid"], row["bad"], marker, color=colour, markersize=9, label=row["method"])
+    draw_matchers(axes, others)
     mask, threshold, scenes = means[0]["mask"], means[0]["threshold_px"], means[0]["scene"]
     axes.set_xlabel(f"invalid: {mask} pixels without a disparity (%), {scenes} scenes")
     axes.set_ylabel(f"bad: reported {mask} pixels off by more than {threshold:g} px (%)")

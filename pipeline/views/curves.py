@@ -18,10 +18,16 @@ Curve = dict[float, tuple[float, float]]
 _MARKED = 5
 """Values of R that are written beside a curve, at most."""
 _DASHES = ("-", "--", ":", "-.")
+_MARKERS = "sD^vPX*"
 
 
 def error_curve_figure(
-    rows: Iterable[Row], *, title: str = "Error versus invalid pixels", mask: str = "nonocc", threshold: float = 1.0
+    rows: Iterable[Row],
+    *,
+    title: str = "Error versus invalid pixels",
+    mask: str = "nonocc",
+    threshold: float = 1.0,
+    others: Sequence[Row] = (),
 ) -> Figure:
     """Return the curve of error against invalid pixels as R grows, a line a scene, and their mean.
 
@@ -31,6 +37,7 @@ def error_curve_figure(
         title: stands above, taken literally.
         mask: ``nonocc`` or ``all``.
         threshold: px, error above which a pixel is wrong.
+        others: a row a matcher that becomes a point, with ``method``, ``invalid`` and ``bad`` over the same scenes.
 
     Returns:
         A figure: x is the percentage of invalid pixels, y the percentage of wrong ones among the reported. The
@@ -50,6 +57,7 @@ def error_curve_figure(
         colour, dash = next(styles)
         _draw(axes, curve, _named(scene, family), color=colour, linestyle=dash, linewidth=1.2, marker=".")
     _draw_means(axes, curves)
+    draw_matchers(axes, others)
     _label(axes, mask, threshold)
     return figure
 
@@ -118,11 +126,25 @@ def _write_thresholds(axes: Axes, curve: Curve) -> None:
         axes.annotate(f"R = {R:g}", curve[R], bbox=box, zorder=5, **place)
 
 
+def draw_matchers(axes: Axes, means: Iterable[Row]) -> None:
+    """Draw a point a matcher: ``method``, ``invalid`` and ``bad`` of each row, in percent."""
+    for row, marker, colour in zip(means, cycle(_MARKERS), cycle(LINES[1:]), strict=False):
+        style: dict[str, Any] = {
+            "color": colour,
+            "markeredgecolor": "black",
+            "markersize": 8.5,
+            "linestyle": "none",
+            "zorder": 6,
+        }
+        axes.plot(row["invalid"], row["bad"], marker, label=row["method"], **style)
+
+
 def _label(axes: Axes, mask: str, threshold: float) -> None:
     axes.set_xlabel(f"invalid: {mask} pixels without a disparity (%)")
     axes.set_ylabel(f"bad: reported {mask} pixels off by more than {threshold:g} px (%)")
     axes.set_ylim(bottom=0)
     axes.margins(x=0.12)
+    axes.set_xlim(left=-1)
     axes.grid(alpha=0.3)
     legend = axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False, fontsize="small")
     for text in legend.get_texts():

@@ -1,5 +1,8 @@
 """Figures of trained networks: how they learnt; of networks without a curve, what their parameters are like."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -17,27 +20,36 @@ def draw_network(figure: Figure, dataset: xr.Dataset) -> None:
     """Draw the loss of each training step; of shipped weights, which bring no curve, the parameters."""
     figure.set_size_inches(10, 5)
     if "loss" in dataset:
-        _draw_loss(figure.subplots(), dataset["loss"].values)
+        _draw_loss(figure.subplots(), dataset["loss"].values, dataset.attrs.get("params", {}))
     else:
         _draw_parameters(figure.subplots(1, 2), dataset["parameters"].values)
 
 
-def _draw_loss(axes: Axes, loss: NDArray[np.float32]) -> None:
+def loss_name(params: Mapping[str, Any]) -> str:
+    """Return what the loss of a network consists of, by the settings of its training.
+
+    >>> loss_name({"ranking": 4.0}), loss_name({})
+    ('class-balanced cross-entropy + 4 x ranking loss', 'class-balanced cross-entropy')
+    """
+    ranking = params.get("ranking", 0)
+    return "class-balanced cross-entropy" + (f" + {ranking:g} x ranking loss" if ranking else "")
+
+
+def _draw_loss(axes: Axes, loss: NDArray[np.float32], params: Mapping[str, Any]) -> None:
     window = loss.size // 20
     smooth = window > 1
     axes.plot(np.arange(1, loss.size + 1), loss, color=QUIET if smooth else BLUE, linewidth=0.9, label="each step")
     if smooth:
         steps = np.arange(window, loss.size + 1)
         axes.plot(steps, trailing_mean(loss, window), color=BLUE, linewidth=2, label=f"mean of the last {window} steps")
-    axes.axhline(_COIN, color=RED, linestyle="--", linewidth=1.2, label="ln 2: a coin's guess")
+    if not params.get("ranking"):  # what a guess costs in the ranking loss depends on the range of disparities
+        axes.axhline(_COIN, color=RED, linestyle="--", linewidth=1.2, label="ln 2: a coin's guess")
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set(
-        xlabel="training step", ylabel="class-balanced cross-entropy (nats, log scale)", xlim=(1, max(loss.size, 2))
-    )
+    axes.set(xlabel="training step", ylabel=f"{loss_name(params)} (nats, log scale)", xlim=(1, max(loss.size, 2)))
     axes.grid(alpha=0.3)
     axes.legend()
 

@@ -82,7 +82,7 @@ def reliability_figure(found: Reliability, *, title: str, mask: str = "all", thr
 def _draw_shares(axes: Axes, found: Reliability) -> None:
     axes.plot([0, 1], [0, 1], color=QUIET, linestyle="--", linewidth=1.5, label="as sure as it should be")
     told = found.pixels >= _FEWEST
-    label = f"this confidence (calibration error {found.error:.3f})"
+    label = f"this confidence (expected calibration error {found.error:.3f})"
     axes.plot(found.confidence[told], found.right[told], color=BLUE, marker="o", linewidth=1.8, label=label)
     axes.set_ylim(0, 1)
     axes.legend(loc="lower right", frameon=False)

@@ -53,28 +53,30 @@ def untextured_share(images: Arrays) -> float:
 
 def _sheet(found: "Comparison", scenes: list[str], title: str) -> Figure:
     """Return a figure with a row a scene: view, truth, raw map, semi-dense map, the others' maps."""
-    rows = {scene: _pictures(found.arrays(scene)) for scene in scenes}
+    arrays = {scene: found.arrays(scene) for scene in scenes}
+    rows = {scene: _pictures(products, found.R) for scene, products in arrays.items()}
     names = list(next(iter(rows.values())))
     height, width = next(iter(rows.values()))[names[0]].shape[:2]
-    drawn = new_figure(f"{title}; black: no disparity")
-    drawn.set_size_inches(_WIDTH * len(names) + 0.5, len(rows) * (_WIDTH * height / width + 0.15) + 0.9)
+    drawn = new_figure(f"{title}; blue: far, yellow: near, black: no disparity")
+    drawn.set_size_inches(_WIDTH * len(names) + 0.5, len(rows) * (_WIDTH * height / width + 0.1) + 0.6)
     panels = drawn.subplots(len(rows), len(names), squeeze=False)
     for panel_row, (scene, pictures) in zip(panels, rows.items(), strict=True):
         for axes, (name, picture) in zip(panel_row, pictures.items(), strict=True):
             axes.imshow(picture, interpolation="nearest")
             axes.set(xticks=[], yticks=[], title=name if scene == scenes[0] else "")
-        panel_row[0].set_ylabel(scene, parse_math=False)
+        low, high = disparity_span(arrays[scene]["truth"]["disparity"])
+        panel_row[0].set_ylabel(f"{scene}\n{low:g} to {high:g} px", parse_math=False)
     return drawn
 
 
-def _pictures(products: Mapping[str, Arrays]) -> dict[str, NDArray[np.uint8]]:
+def _pictures(products: Mapping[str, Arrays], R: float | None) -> dict[str, NDArray[np.uint8]]:
     """Return a scene's pictures by name; all disparities in the colours of the truth's range."""
     truth = products["truth"]["disparity"]
     span = disparity_span(truth)
     maps: dict[str, Array] = {
         "truth": truth,
         "dual-cnn raw": products["disparity"]["disparity"],
-        "dual-cnn": products["semidense"]["disparity"],
+        "dual-cnn" + (f", R = {R:g}" if R is not None else ""): products["semidense"]["disparity"],
         **{name: products[product]["disparity"] for product, name in _OTHERS.items() if product in products},
     }
     left = np.repeat(to_gray(products["images"]["left"])[..., np.newaxis], 3, axis=2)

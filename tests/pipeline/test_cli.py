@@ -34,6 +34,17 @@ def test_every_command_has_help(invoke: Invoke, command: str) -> None:
     assert "Usage: pipeline" in ran.out
 
 
+@pytest.mark.parametrize("group", ["", "cache", "data"])
+def test_no_description_of_a_command_is_cut(invoke: Invoke, monkeypatch: pytest.MonkeyPatch, group: str) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    commands = invoke(*group.split(), "--help").out.partition("Commands:\n")[2].splitlines()
+    assert commands and all(line.endswith(".") and not line.endswith("...") for line in commands)
+
+
+def test_run_comes_first(invoke: Invoke) -> None:
+    assert invoke("--help").out.partition("Commands:\n")[2].split()[0] == "run"
+
+
 def only_object(text: str) -> dict[str, Any]:
     """Return the one JSON object that a text is."""
     found: dict[str, Any] = json.loads(text)

@@ -80,6 +80,14 @@ def test_a_better_confidence_has_a_smaller_area(judged: Judged) -> None:
     assert good["raw_bad"] == 25
 
 
+def test_only_the_masks_and_thresholds_that_are_wanted(judged: Judged) -> None:
+    wanted = Judged("hand", judged.truth, ["nonocc"], [2.0, 1.0])
+    every = [row for row in auc_rows(judged, "any", SURE, RAW) if row["mask"] == "nonocc"]
+    found = list(auc_rows(wanted, "any", SURE, RAW))
+    assert [row["threshold_px"] for row in found] == [2.0, 1.0]
+    assert all(row in every for row in found)
+
+
 def test_means_are_over_scenes_and_only_of_what_all_have() -> None:
     same = {"experiment": "density", "method": "any", "mask": "all", "threshold_px": 1.0}
     rows = [

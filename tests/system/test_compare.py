@@ -16,6 +16,7 @@ from pipeline.comparison_report import COLUMNS, print_comparison, write_comparis
 from pipeline.environment import missing_packages
 from pipeline.errors import UsageError
 from pipeline.quoted import NAMED, QUOTED
+from pipeline.reporting import report
 from stages.catalog import STAGES
 from tests.tiny import SETTINGS, SPEC, TEST_ONLY
 
@@ -79,6 +80,24 @@ def test_a_second_comparison_computes_nothing_and_says_the_same(found: Compariso
     again = compare(task, train_on=SPEC)
     assert all(made.reused for made in again.result.made.values())
     assert again.rows == found.rows
+
+
+def test_the_report_shows_what_is_cached_and_says_the_same(found: Comparison, task: Task, tmp_path: Path) -> None:
+    page = report(task, tmp_path / "report.html").read_text()
+    for row in (row for row in found.rows if row["mask"] == "nonocc" and row["threshold_px"] == 1):
+        if row["experiment"] == "auc":
+            assert row["method"] in page and f'<td class="number">{row["auc"]:.4f}</td>' in page
+        if row["experiment"] == "density" and "R" not in row:
+            assert f'<td class="number">{row["invalid"]:.1f}</td>' in page, "the table"
+            assert ("bad" in row) == (f">{row['method']}</text>" in page), "the curve's legend"
+
+
+def test_the_report_makes_nothing_and_leaves_out_other_settings(task: Task, tmp_path: Path) -> None:
+    other = replace(task, settings=[*task.settings, "sgm.window=7", "o1_forest.samples=400"])
+    before = {path for path in Path(str(task.cache)).rglob("*") if path.parent.name != "leases"}
+    page = report(other, tmp_path / "report.html").read_text()
+    assert (">CCNN<" in page) and not any(name in page for name in (">SGM (OpenCV SGBM)<", ">O1<"))
+    assert {path for path in Path(str(task.cache)).rglob("*") if path.parent.name != "leases"} <= before
 
 
 def test_what_needs_training_says_so_without_a_training_set(found: Comparison, task: Task) -> None:

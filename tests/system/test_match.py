@@ -32,6 +32,20 @@ def test_one_command_from_two_files_to_a_folder(invoke: Invoke, pair: Path, tmp_
     assert 50 <= about["density_percent"] <= 100
 
 
+@pytest.mark.parametrize(("variable", "drawn"), [("COLORTERM", True), ("NO_COLOR", False)])
+def test_a_terminal_in_colour_shows_the_map(
+    invoke: Invoke, pair: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variable: str, drawn: bool
+) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    for name, value in (("FORCE_COLOR", "1"), ("TERM", "xterm-256color"), (variable, "truecolor")):
+        monkeypatch.setenv(name, value)
+    files = pair / "im0.png", pair / "im1.png"
+    ran = invoke("match", *files, "--max-disp", "3", "-o", tmp_path / "out", "--cache", tmp_path / "cache")
+    assert ran.code == 0, ran.err
+    assert ("▀" in ran.out) == drawn
+    assert ("black none" in ran.out) == drawn
+
+
 def test_a_dry_run_says_what_would_be_made_and_makes_nothing(invoke: Invoke, pair: Path, tmp_path: Path) -> None:
     files = pair / "im0.png", pair / "im1.png"
     ran = invoke(

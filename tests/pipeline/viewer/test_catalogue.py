@@ -22,6 +22,22 @@ def test_everything_behind_a_confidence_is_found(made: Handmade) -> None:
     assert configuration.keys["truth"] == made.entries["truth"].key
 
 
+def test_what_was_made_from_a_configuration_is_found(made: Handmade) -> None:
+    first = made.entries["confidence"]
+    disparity = np.zeros((60, 90), np.float32)
+    made.write("semidense", {"R": 0.9}, ("disparity", "confidence"), disparity=disparity)
+    made.write("filled", {}, ("disparity", "semidense"), disparity=disparity)
+    made.write("sgm", {}, ("images",), disparity=disparity)
+    judge(made, np.zeros((60, 90), np.float32), 7)
+    made.write("semidense", {"R": 0.8}, ("disparity", "confidence"), disparity=disparity + 1)
+    configurations = catalogue(made.store)[0].configurations
+    further = {each.keys["confidence"]: [entry.recipe.stage for entry in each.further] for each in configurations}
+    assert further == {
+        first.key: ["metrics", "semidense", "filled", "sgm"],
+        made.entries["confidence"].key: ["sgm", "metrics", "semidense"],
+    }
+
+
 def test_configurations_are_named_by_what_differs(made: Handmade) -> None:
     judge(made, np.zeros((60, 90), np.float32), 7)
     (scene,) = catalogue(made.store)

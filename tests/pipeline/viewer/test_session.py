@@ -39,6 +39,10 @@ def test_the_latest_configuration_is_shown(session: Session, shown: Handmade) ->
     assert not session.panels.costs_box.visible
 
 
+def test_the_products_made_from_it_are_listed(session: Session) -> None:
+    assert "made from these: 1" in session.panels.products.text
+
+
 def test_a_mask_and_a_threshold_change_the_figures(session: Session) -> None:
     before = list(session.sources.table.data["bad"])
     session.controls.threshold.value = "4"

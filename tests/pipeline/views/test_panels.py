@@ -95,6 +95,13 @@ def test_a_short_curve_has_no_mean() -> None:
     assert [line.get_label() for line in figure.axes[0].lines] == ["each step", "ln 2: a coin's guess"]
 
 
+def test_a_ranking_loss_is_told_and_has_no_coin_s_guess() -> None:
+    figure = new_figure("any")
+    draw_network(figure, products.network().assign_attrs(params={"ranking": 4.0}))
+    assert "+ 4 x ranking loss" in figure.axes[0].get_ylabel()
+    assert not any("coin" in str(line.get_label()) for line in figure.axes[0].lines)
+
+
 def test_trailing_mean() -> None:
     assert trailing_mean(np.array([1, 3, 5, 7], np.float32), 2).tolist() == [2, 4, 6]
 

@@ -5,7 +5,7 @@ from pipeline.steps import PRODUCTS as ALL_PRODUCTS
 from pipeline.views.small import small_disparity, small_picture
 from tests.pipeline.views.products import PRODUCTS
 
-MAPS = {"images", "truth", "disparity", "semidense", "confidence"}
+MAPS = {"images", "truth", "disparity", "semidense", "right_disparity", "refined", "filled", "confidence"}
 
 
 @pytest.mark.parametrize("product", ALL_PRODUCTS)
@@ -20,3 +20,11 @@ def test_none_is_black_and_told() -> None:
     picture = small_disparity(np.array([[np.nan, 3.0]], np.float32))
     assert picture.rgb[0, 0].tolist() == [0, 0, 0]
     assert "black none (50.0 %)" in picture.legend
+
+
+def test_a_large_map_is_thinned_and_told_as_a_whole() -> None:
+    disparity = np.ones((1000, 1000), np.float32)
+    disparity[:250] = np.nan
+    picture = small_disparity(disparity)
+    assert picture.rgb.shape[0] * picture.rgb.shape[1] <= 100_000
+    assert "black none (25.0 %)" in picture.legend
