@@ -60,12 +60,13 @@ def _there(planned: Planned) -> Made:
 
 def _on_threads(plan: Plan, context: Context, threads: int) -> dict[str, Made]:
     import dask
+    from dask.threaded import get
 
     drafts = _Drafts(context.watch)
     results, _ = _graph(plan, replace(context, watch=drafts))
     pool = ThreadPoolExecutor(threads)
     try:
-        made: Sequence[Made] = dask.compute(*results, scheduler="threads", pool=pool)
+        made: Sequence[Made] = dask.compute(*results, scheduler=get, pool=pool)  # by its name, distributed is loaded
     except Exception:
         # The failed task's siblings go on for a while: what they write must not outlive the drafts.
         context.claims.stop()
