@@ -28,12 +28,17 @@ _FIGURES = ("density", "bad")
 
 
 def sgbm(scene: SceneSource) -> NDArray[np.float32]:
+    """Return SGBM's disparities of a scene: (y, x) float32, px, NaN where it reports none."""
+    left, right = (to_gray(view) for view in scene.load_images())
+    return sgbm_map(left, right, range(scene.disparities.minimum, scene.disparities.maximum + 1))
+
+
+def sgbm_map(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float32]:
     """Return SGBM's disparities: (y, x) float32, px, NaN where it reports none."""
     import cv2
 
-    left, right = (to_gray(view) for view in scene.load_images())
-    low = scene.disparities.minimum
-    count = -(-scene.disparities.count // 16) * 16
+    low = disparities[0]
+    count = -(-len(disparities) // 16) * 16
     matcher = cv2.StereoSGBM.create(
         minDisparity=low,
         numDisparities=count,
