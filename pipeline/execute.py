@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
+from uuid import uuid4
 
 from cache import Draft, Lease, Store
 from pipeline import tasks
@@ -135,7 +136,9 @@ def _delayed_step(step: Step, plan: Plan, context: Context, results: Mapping[str
     from dask import delayed
 
     def task(function: Any, *arguments: Any) -> Any:  # noqa: ANN401
-        return delayed(function, pure=False, traverse=False)(*arguments)
+        # Dask's profilers and dashboard show the name; it is new each time, for a cluster keeps results by it.
+        name = f"{step.product}-{function.__name__}-{uuid4().hex}"
+        return delayed(function, pure=False, traverse=False)(*arguments, dask_key_name=name)
 
     shared = delayed(context, traverse=False)
     inputs = [results[each] for each in dict.fromkeys(each for ids in step.inputs.values() for each in ids)]

@@ -59,7 +59,7 @@ class Unwatched:
 
 @dataclass(frozen=True)
 class Context:
-    """What every task is given: the cache, who watches, what is stored beside results, who makes what, what was read."""
+    """What every task is given: cache, watch, what is stored beside results, who makes what, what was read last."""
 
     store: Store
     watch: Watch
