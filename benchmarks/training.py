@@ -29,7 +29,8 @@ def trainer(form: Form, batch: int) -> tuple[Callable[[], None], int]:
     scene = open_dataset(SCENE).scenes[0].load()
     if scene.truth is None:
         raise typer.BadParameter(f"{SCENE} has no ground truth")
-    truth = {"disparity": scene.truth.disparity, "nonocc": scene.truth.nonocc}
+    ends = np.array([scene.disparities.minimum, scene.disparities.maximum])
+    truth = {"disparity": scene.truth.disparity, "nonocc": scene.truth.nonocc, "range": ends}
     views = [channels(scene.left, scene.right)]
     params = MatchingSamplesParams(form=form, samples=batch, mirror=False)
     samples = draw_samples(params, {"truth": [truth | _no_right_truth(scene.truth.disparity.shape)]})

@@ -18,7 +18,7 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def growth_on_little() -> None:
-    growth.main(shrink=8, pairs=1)
+    growth.main(shrink=4, pairs=1)
 
 
 def memory_on_little() -> None:
