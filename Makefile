@@ -27,10 +27,11 @@ calibration: $(READY)  ## DATA=DIR: measure on the same scenes what the confiden
 	$(BIN)/pipeline run middlebury:$(DATA) --train --upto calibration --output build/weights
 	cp build/weights/calibration.safetensors stages/weights/
 
-bench: $(READY)  ## DATA=DIR (optional): every benchmark of speed, bfloat16 against float32, what guarding costs
+bench: $(READY)  ## DATA=DIR (optional): every benchmark of speed, bfloat16 against float32, what guarding costs, a time line
 	$(BIN)/python -m benchmarks
 	$(BIN)/python -m benchmarks.precision --rows 12 $(if $(DATA),middlebury:$(DATA)/MiddEval3/trainingQ,motorcycle)
 	$(BIN)/python -m benchmarks.guarding
+	$(BIN)/python -m benchmarks.timeline
 
 faults: $(READY)  ## inject every fault of the matrix, and put the outcome where README.md and docs/cache.md quote it
 	$(BIN)/python -m tests.faults --json docs/faults.json --quote

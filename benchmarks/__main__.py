@@ -6,7 +6,18 @@ import sys
 
 from benchmarks.harness import FOLDER, print_rows
 
-NAMES = ("transforms", "evaluation", "roofline", "cached_run", "sweep")
+NAMES = (
+    "transforms",
+    "evaluation",
+    "cost_volume",
+    "roofline",
+    "training",
+    "growth",
+    "workers",
+    "cached_run",
+    "sweep",
+    "memory",
+)
 
 
 def main() -> None:

@@ -3,7 +3,7 @@
 import json
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
@@ -72,13 +72,24 @@ def compare(what: str, ours: Side, theirs: Side, target: float, *, work: float =
     return Ratio(what, tuple(work * other / one for one, other in times), target, seconds=seconds)
 
 
+def median_seconds(side: Side, times: int = PAIRS) -> float:
+    """Return the median wall time of some calls, after one to warm up."""
+    side()
+    return median(timed(side) for _ in range(times))
+
+
 def report(name: str, ratios: Sequence[Ratio]) -> None:
     """Print a table and write ``build/bench/NAME.json``."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
     rows = [asdict(ratio) | {"median": ratio.median, "met": ratio.met} for ratio in ratios]
-    document = {"name": name, "load": os.getloadavg()[0], "cores": os.cpu_count(), "ratios": rows}
-    (FOLDER / f"{name}.json").write_text(json.dumps(document, indent=2) + "\n")
+    write(name, {"ratios": rows})
     print_rows(rows)
+
+
+def write(name: str, content: Mapping[str, object]) -> None:
+    """Write ``build/bench/NAME.json``, with what the machine is and how busy."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    document = {"name": name, "load": os.getloadavg()[0], "cores": os.cpu_count(), **content}
+    (FOLDER / f"{name}.json").write_text(json.dumps(document, indent=2) + "\n")
 
 
 def print_rows(rows: Sequence[dict[str, object]]) -> None:

@@ -5,6 +5,7 @@ import os
 import stat
 import time
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -47,7 +48,12 @@ def read_record(layout: Layout, key: str) -> Entry:
             data = read_plain(path)
         except FileNotFoundError:
             raise EntryNotFound(f"no entry has the key {key} in {layout.root}") from None
-    return Entry.from_bytes(key, data)
+    return _entry(key, data)
+
+
+# A run reads the same documents several times; the same bytes need be parsed and compared but once.
+_entry = lru_cache(2048)(Entry.from_bytes)
+_manifest = lru_cache(2048)(Manifest.from_bytes)
 
 
 def read_plain(path: Path) -> bytes:
@@ -94,7 +100,7 @@ def _read_manifest(folder: Path, entry: Entry) -> Manifest:
     """Return the manifest if it is the one that the record tells."""
     if not stat.S_ISDIR(folder.lstat().st_mode):
         raise DamagedEntry(f"{folder} is not a folder")
-    manifest = Manifest.from_bytes(read_plain(folder / MANIFEST))
+    manifest = _manifest(read_plain(folder / MANIFEST))
     if (manifest.digest, manifest.size) != (entry.digest, entry.size):
         raise DamagedEntry(f"its manifest has digest {manifest.digest}, its record {entry.digest}")
     return manifest

@@ -55,6 +55,12 @@ def code_parts(module: str, packages: tuple[str, ...]) -> dict[str, str]:
     Raises:
         SourceNotFound: if ``module`` has no Python source, or a file cannot be read or parsed.
     """
+    return dict(_parts(module, packages))
+
+
+@cache
+def _parts(module: str, packages: tuple[str, ...]) -> Mapping[str, str]:
+    """Return what ``code_parts`` does, worked out once a process; nobody may change it."""
     found: dict[str, str] = {}
     waiting = [module]
     if _locate(module) is None:
@@ -63,7 +69,8 @@ def code_parts(module: str, packages: tuple[str, ...]) -> dict[str, str]:
         name = waiting.pop()
         if name not in found and (located := _locate(name)) and located.file:
             found[name], imports, _ = _read(located)
-            waiting += (part for each in (name, *imports) for part in _parents(each) if part.split(".")[0] in packages)
+            followed = (each for each in (name, *imports) if each.partition(".")[0] in packages)
+            waiting += (part for each in followed for part in _parents(each))
     return dict(sorted(found.items()))
 
 

@@ -1,5 +1,6 @@
 """Work in progress: a folder of its own into which arrays are written, and which is then published whole."""
 
+import json
 import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -77,14 +78,17 @@ class Draft:
             CacheUnavailable: if the file system refuses.
         """
         import numpy as np
+        import zarr
         from zarr.codecs import ZstdCodec
 
         kind = _require_dtype(name, dtype)
         with self._writing():
-            group = self._group()
-            self._require_fit(name, shape, chunks, dims, dict(group.arrays()))
-            group.create_array(
-                name,
+            self._require_fit(name, shape, chunks, dims)
+            if not (self.path / DATA / "zarr.json").is_file():
+                self._group()
+            zarr.create_array(
+                self.path / DATA / name,
+                zarr_format=3,
                 shape=tuple(shape),
                 dtype=kind,
                 chunks=tuple(max(1, min(chunk, size)) for chunk, size in zip(chunks, shape, strict=True)),
@@ -103,10 +107,10 @@ class Draft:
         shape: Sequence[int],
         chunks: Sequence[int],
         dims: Sequence[str],
-        others: "Mapping[str, zarr.Array[Any]]",
     ) -> None:
         """Refuse an array that could not be opened together with the others."""
         where = f"array {name!r} of {self.recipe.stage}"
+        others = self._sizes()
         if not _NAME.fullmatch(name) or name in others:
             raise InvalidArray(f"{where}: the name is taken, or not made of letters, digits and _")
         if not len(shape) == len(chunks) == len(dims) == len(set(dims)):
@@ -115,7 +119,7 @@ class Draft:
             )
         if any(size < 0 for size in shape) or any(chunk < 1 for chunk in chunks):
             raise InvalidArray(f"{where}: shape {shape} must not be negative, and chunks {chunks} must be positive")
-        sizes = {dim: size for array in others.values() for dim, size in zip(_dims(array), array.shape, strict=True)}
+        sizes = {dim: size for other in others.values() for dim, size in other.items()}
         for dim, size in zip(dims, shape, strict=True):
             if sizes.get(dim, size) != size:
                 raise InvalidArray(f"{where}: {dim} has length {size}, in another array of the draft {sizes[dim]}")
@@ -199,6 +203,16 @@ class Draft:
         with writing(self.path):
             yield
 
+    def _sizes(self) -> dict[str, dict[str, int]]:
+        """Return the length of each dimension of each array that is there.
+
+        Read from the files: zarr would open every array, and a product of many small ones would wait for that most.
+        """
+        found = {path.parent.name: json.loads(path.read_bytes()) for path in (self.path / DATA).glob("*/zarr.json")}
+        return {
+            name: dict(zip(each.get("dimension_names", ()), each["shape"], strict=True)) for name, each in found.items()
+        }
+
     def _group(self) -> "zarr.Group":
         """Open the draft's arrays; the group is there from the first of them on."""
         import zarr
@@ -242,11 +256,6 @@ def _require_dtype(name: str, dtype: str) -> "np.dtype[Any]":
     if kind.kind not in "biuf" or not kind.isnative or kind.itemsize > 8:
         raise InvalidArray(f"array {name!r}: {dtype!r} cannot be stored: use bool, an integer or a float type")
     return kind
-
-
-def _dims(array: "zarr.Array[Any]") -> Sequence[str]:
-    """Return the names of an array's dimensions."""
-    return array.metadata.dimension_names or ()  # type: ignore[union-attr, return-value]
 
 
 def _chunk_keys(array: "zarr.Array[Any]") -> Iterator[str]:

@@ -1,9 +1,16 @@
 """What changes a result's bits besides code, settings and inputs: the versions of packages."""
 
-from importlib.metadata import PackageNotFoundError, version
+from functools import cache
+from importlib import metadata
 
 from pipeline.errors import UsageError
 from stages.stage import Stage
+
+
+@cache
+def version(distribution: str) -> str:
+    """Return the version of an installed distribution; its files are read once a process."""
+    return metadata.version(distribution)
 
 
 def environment(stage: Stage) -> dict[str, str]:
@@ -28,6 +35,6 @@ def missing_packages(stage: Stage) -> tuple[str, ...]:
 def _installed(distribution: str) -> bool:
     try:
         version(distribution)
-    except PackageNotFoundError:
+    except metadata.PackageNotFoundError:
         return False
     return True

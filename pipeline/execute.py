@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
+from uuid import uuid4
 
 from cache import Draft, Lease, Store
 from pipeline import tasks
@@ -60,12 +61,13 @@ def _there(planned: Planned) -> Made:
 
 def _on_threads(plan: Plan, context: Context, threads: int) -> dict[str, Made]:
     import dask
+    from dask.threaded import get
 
     drafts = _Drafts(context.watch)
     results, _ = _graph(plan, replace(context, watch=drafts))
     pool = ThreadPoolExecutor(threads)
     try:
-        made: Sequence[Made] = dask.compute(*results, scheduler="threads", pool=pool)
+        made: Sequence[Made] = dask.compute(*results, scheduler=get, pool=pool)  # by its name, distributed is loaded
     except Exception:
         # The failed task's siblings go on for a while: what they write must not outlive the drafts.
         context.claims.stop()
@@ -140,7 +142,9 @@ def _delayed_step(step: Step, plan: Plan, context: Context, results: Mapping[str
     from dask import delayed
 
     def task(function: Any, *arguments: Any) -> Any:  # noqa: ANN401
-        return delayed(function, pure=False, traverse=False)(*arguments)
+        # Dask's profilers and dashboard show the name; it is new each time, for a cluster keeps results by it.
+        name = f"{step.product}-{function.__name__}-{uuid4().hex}"
+        return delayed(function, pure=False, traverse=False)(*arguments, dask_key_name=name)
 
     shared = delayed(context, traverse=False)
     inputs = [results[each] for each in dict.fromkeys(each for ids in step.inputs.values() for each in ids)]

@@ -7,8 +7,7 @@ writes what it makes into its draft, in whichever process it runs.
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from importlib.metadata import version
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,7 +15,9 @@ import numpy as np
 from cache import DamagedEntry, Draft, Entry, EntryNotFound, Recipe, Store
 from pipeline.checkpoints import Checkpoints
 from pipeline.claims import Claims
+from pipeline.environment import version
 from pipeline.errors import DISK_ERRNOS, USER_ERRORS, StageFailed, StageRefused
+from pipeline.recent import Recent
 from pipeline.steps import Step
 from pipeline.tiles import Rows, read_block, trim
 from stages.stage import Array, Arrays, Output
@@ -58,12 +59,13 @@ class Unwatched:
 
 @dataclass(frozen=True)
 class Context:
-    """What every task is given: the cache, who watches, what is stored beside each result, and who makes what."""
+    """What every task is given: cache, watch, what is stored beside results, who makes what, what was read last."""
 
     store: Store
     watch: Watch
     extras: Mapping[str, Any]
     claims: Claims
+    recent: Recent = field(default_factory=Recent)
 
 
 @dataclass(frozen=True)
@@ -187,7 +189,7 @@ def make_whole(context: Context, job: Job) -> None:
         return
     step = job.step
     with explained(step):
-        inputs = {product: _read_whole(context.store, step, product, keys) for product, keys in job.inputs.items()}
+        inputs = {product: _read_whole(context, step, product, keys) for product, keys in job.inputs.items()}
         made = step.stage.function()(step.argument, inputs, *_monitor(context, job.draft, step))
         for output in step.stage.outputs:
             array = made[output.name].astype(output.dtype or made[output.name].dtype, copy=False)
@@ -233,9 +235,9 @@ def _made(step: Step, entry: Entry, reused: bool) -> Made:
     return Made(step, entry.key, entry.digest, entry.seconds, reused)
 
 
-def _read_whole(store: Store, step: Step, product: str, keys: Sequence[str]) -> Arrays | Sequence[Arrays]:
+def _read_whole(context: Context, step: Step, product: str, keys: Sequence[str]) -> Arrays | Sequence[Arrays]:
     """Return a product's arrays; where a split step takes one a scene, a list."""
-    arrays = [read_arrays(store, key) for key in keys]
+    arrays = [context.recent.read(context.store, key) for key in keys]
     return arrays if step.takes_list(product) else arrays[0]
 
 

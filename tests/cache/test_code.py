@@ -5,11 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from cache.code import _locate, _read, code_hash, code_parts
+from cache.code import _locate, _parts, _read, code_hash, code_parts
 from cache.errors import SourceNotFound
 
 Tree = Callable[..., str]
 _numbers = itertools.count()
+
+
+def _forget() -> None:
+    for each in (_locate, _read, _parts):
+        each.cache_clear()
 
 
 @pytest.fixture
@@ -23,13 +28,11 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Tree]:
             file = tmp_path / package / path
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text.replace("PKG", package), encoding="utf-8")
-        _locate.cache_clear()
-        _read.cache_clear()
+        _forget()
         return package
 
     yield write
-    _locate.cache_clear()
-    _read.cache_clear()
+    _forget()
 
 
 SOURCE = '''

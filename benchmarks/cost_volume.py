@@ -1,0 +1,152 @@
+"""The exact cost volume against MC-CNN accurate, and beside fast matchers: ``python -m benchmarks.cost_volume``.
+
+The first figure is a ratio of the time from two views to their volume, on the same crop of Motorcycle, one thread on
+both sides. The table below it has, on some rows of the scene, the time and the raw error (> 1 px, nonocc, what is not
+reported counted wrong) of this project, MC-CNN fast with each of its back ends, and OpenCV's SGBM; and a picture.
+"""
+
+import sys
+from collections.abc import Callable
+from importlib import resources
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.harness import FOLDER, PAIRS, Ratio, median_seconds, report, timed, write
+from benchmarks.peers import AccurateMatcher, PeerError
+from datasets import Scene, open_dataset
+from pipeline.shipped import read_shipped_weights
+from stages.baselines.declaration import SgmParams
+from stages.baselines.sgm import match_semi_global
+from stages.disparity import winner_take_all
+from stages.matching.cost_volume import cost_volume
+from stages.matching.net import net_from_parameters
+from stages.metrics import raw_bad
+from stages.transforms.channels import channels
+from stages.transforms.gray import to_gray
+
+PICTURE = Path("docs/pictures/matchers.png")
+Map = Callable[[], NDArray[np.float32]]
+
+
+def main(
+    rows: Annotated[int, typer.Option(help="rows of the scene that the matchers are compared on")] = 48,
+    crop: Annotated[tuple[int, int, int], typer.Option(help="rows, columns, disparities for the ratio")] = (
+        48,
+        128,
+        24,
+    ),
+    pairs: Annotated[int, typer.Option()] = PAIRS,
+    install: Annotated[bool, typer.Option(help="install MC-CNN accurate into build/bench")] = True,
+    picture: Annotated[Path, typer.Option()] = PICTURE,
+) -> None:
+    """Print the ratio and the table, write both as JSON, draw the picture."""
+    scene = open_dataset("motorcycle").scenes[0].load()
+    ratios = list(_against_accurate(scene, crop, pairs)) if install else []
+    matchers = _matchers(scene, rows, pairs)
+    report("cost_volume", ratios)
+    write("matchers", {"rows": rows, "matchers": matchers})
+    table = Table("matcher", "seconds", "raw error, %", box=None)
+    for name, found in matchers.items():
+        table.add_row(name, f"{found['seconds']:.3g}", f"{found['raw_bad']:.1f}")
+    Console(width=120).print(table)
+    _draw(matchers, rows, picture)
+
+
+def _volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float32]:
+    net = net_from_parameters(read_shipped_weights("matching_net", {})["parameters"], 3)
+    return cost_volume(net, channels(left, right), disparities)
+
+
+def _against_accurate(scene: Scene, crop: tuple[int, int, int], pairs: int) -> list[Ratio]:
+    """Return the ratio to MC-CNN accurate; where that cannot be had, say so and return none."""
+    height, width, count = crop
+    first, left_of = 200, 300
+    part = slice(first, first + height), slice(left_of, left_of + width)
+    views = scene.left[part], scene.right[part]
+    disparities = range(count)
+    try:
+        with AccurateMatcher(to_gray(views[0]), to_gray(views[1]), disparities, FOLDER / "peers") as other:
+            _volume(*views, disparities), other.seconds()
+            times = [(timed(lambda: _volume(*views, disparities)), other.seconds()) for _ in range(pairs)]
+    except PeerError as error:
+        print(error, file=sys.stderr)
+        return []
+    seconds = float(np.median([one for one, _ in times])), float(np.median([one for _, one in times]))
+    what = "exact cost volume, times MC-CNN accurate (mccnn 1.2.5)"
+    return [Ratio(what, tuple(other / one for one, other in times), 10, seconds=seconds)]
+
+
+def _matchers(scene: Scene, rows: int, pairs: int) -> dict[str, dict[str, float]]:
+    """Return time and raw error of each matcher on the rows in the middle of the scene."""
+    first = (scene.left.shape[0] - rows) // 2
+    part = slice(first, first + rows)
+    left, right = scene.left[part], scene.right[part]
+    gray = to_gray(left), to_gray(right)
+    disparities = range(scene.disparities.minimum, scene.disparities.maximum + 1)
+    sgm = SgmParams(d_min=disparities[0], d_max=disparities[-1])
+    maps: dict[str, Map] = {
+        "this project, exact": lambda: winner_take_all(_volume(left, right, disparities), disparities[0]),
+        **_fast_matchers(gray, disparities),
+        "OpenCV SGBM, checked": lambda: match_semi_global(*gray, sgm, checked=True),
+    }
+    if scene.truth is None:
+        raise typer.BadParameter("the scene has no ground truth")
+    truth, mask = scene.truth.disparity[part], scene.truth.nonocc[part]
+    return {
+        name: {"raw_bad": raw_bad(made(), truth, mask, 1.0), "seconds": median_seconds(made, pairs)}
+        for name, made in maps.items()
+    }
+
+
+def _fast_matchers(gray: tuple[NDArray[np.uint8], NDArray[np.uint8]], disparities: range) -> dict[str, Map]:
+    """Return MC-CNN fast with each of its weights for Middlebury; none if the extra ``baselines`` is not installed."""
+    try:
+        from mc_cnn.run import run_mc_cnn_fast
+    except ImportError:
+        print("MC-CNN fast is missing: pip install 'semidense-stereo[baselines]' brings it", file=sys.stderr)
+        return {}
+    names = {
+        "torch": "mc_cnn_fast_mb_weights.pt",
+        "onnx int8": "mc_cnn_fast_int8_excl_01.onnx",
+        "onnx dw": "mc_cnn_fast_dw.onnx",
+    }
+
+    def matcher(file: str) -> Map:
+        weights = str(resources.files("mc_cnn") / "weights" / file)
+
+        def made() -> NDArray[np.float32]:
+            views = (np.pad(view.astype(np.float32), 5, mode="edge") for view in gray)
+            costs = run_mc_cnn_fast(*views, -disparities[-1], -disparities[0], weights)
+            return winner_take_all(np.ascontiguousarray(costs[..., ::-1], np.float32), disparities[0])
+
+        return made
+
+    return {f"MC-CNN fast, {name}": matcher(file) for name, file in names.items()}
+
+
+def _draw(matchers: dict[str, dict[str, float]], rows: int, path: Path) -> None:
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(6, 3.6), layout="constrained")
+    for name, found in matchers.items():
+        axes.scatter(found["seconds"], found["raw_bad"], label=name)
+    axes.set(xscale="log", xlabel="seconds", ylabel="raw error > 1 px, %", title=f"Motorcycle, {rows} rows")
+    axes.set_ylim(bottom=0)
+    axes.grid(alpha=0.3, which="both")
+    axes.legend()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,88 @@
+"""Each benchmark on the smallest input: it runs, prints its table and leaves its JSON. What it measures is no test."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from benchmarks import cost_volume, growth, memory, peers, timeline, training, transforms, workers
+from benchmarks.harness import Ratio, compare
+
+TINY = "synthetic:train=0,test=1,height=48,width=64,disparities=4"
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def growth_on_little() -> None:
+    growth.main(shrink=4, pairs=1)
+
+
+def memory_on_little() -> None:
+    memory.main(size=["48x64x4"])
+
+
+def training_on_little() -> None:
+    training.main(batch=1, patches=4, pairs=1)
+
+
+def workers_on_little() -> None:
+    workers.main(rows=48, columns=64, disparities=4, pairs=1)
+
+
+@pytest.mark.parametrize(
+    ("run", "name", "told"),
+    [
+        pytest.param(growth_on_little, "growth", "time a cell", id="growth"),
+        pytest.param(memory_on_little, "memory", "peak of a run", id="memory"),
+        pytest.param(training_on_little, "training", "times patches", id="training"),
+        pytest.param(workers_on_little, "workers", "two workers", id="workers"),
+    ],
+)
+def test_runs(
+    run: Callable[[], None], name: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run()
+    assert told in capsys.readouterr().out
+    found = json.loads((tmp_path / "build" / "bench" / f"{name}.json").read_text())
+    assert found["name"] == name and all(pair > 0 for ratio in found["ratios"] for pair in ratio["pairs"])
+
+
+def test_the_matchers_are_told_with_their_errors_and_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("cv2", reason="needs the extra baselines")
+    cost_volume.main(rows=11, crop=(8, 16, 2), pairs=1, install=False, picture=tmp_path / "p.png")
+    assert "SGBM" in capsys.readouterr().out
+    found = json.loads((tmp_path / "build" / "bench" / "matchers.json").read_text())["matchers"]
+    assert all(0 <= each["raw_bad"] <= 100 and each["seconds"] > 0 for each in found.values())
+    assert (tmp_path / "p.png").stat().st_size > 1000
+
+
+def test_a_time_line_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    timeline.main(TINY, tmp_path / "t.png")
+    told = capsys.readouterr().out
+    assert all(product in told for product in ("costvolume", "confidence", "metrics"))
+    assert (tmp_path / "t.png").stat().st_size > 1000
+
+
+def test_a_matcher_that_cannot_be_had_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(peers.PeerError, match="there-is-no-such-matcher-0 @ file") as error:
+        peers.install(f"there-is-no-such-matcher-0 @ file://{tmp_path}/none.whl", tmp_path / "peers")
+    assert "\n" not in str(error.value)
+
+
+def test_a_ratio_counts_work_and_keeps_its_limit() -> None:
+    ratio = compare("a", lambda: None, lambda: None, 1e9, work=2.0, pairs=3)
+    assert len(ratio.pairs) == 3 and not ratio.met
+    assert Ratio("b", (1.0, 2.0, 9.0), 2.0, at_most=True).met
+    assert not Ratio("b", (1.0, 2.1, 9.0), 2.0, at_most=True).met
+
+
+def test_the_direct_loop_of_the_transforms_is_the_definition() -> None:
+    import numpy as np
+
+    gray, out = np.array([[1, 2, 3]], np.uint8), np.empty((1, 3), np.float32)
+    transforms.direct_rank(gray, 1, out)
+    assert out.tolist() == [[0.5, np.float32(1 / 3), 0.0]]
