@@ -6,7 +6,7 @@ import sys
 
 from benchmarks.harness import FOLDER, print_rows
 
-NAMES = ("transforms", "evaluation", "roofline", "cached_run", "sweep")
+NAMES = ("transforms", "evaluation", "roofline", "cached_run", "sweep", "guided")
 
 
 def main() -> None:

@@ -30,7 +30,7 @@ from stages.matching.transformed import (
 from stages.matching.winograd import TILE, Flat, forward8, load4, load8, store8
 from stages.precision import Precision
 
-BATCH = 128
+BATCH = 256
 """Tiles judged at once: few enough for all that is in between to stay in the processor's cache."""
 REACH = TILE + 2 * RADIUS - 4
 """Rows and columns of the joined maps that a tile takes."""
