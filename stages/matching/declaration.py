@@ -63,8 +63,8 @@ class CostVolumeParams(Params):
     d_max: int | None = Field(None, description="largest disparity, px; default: the scene's own")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
     mode: Mode = Field("exact", description="every cell, or those alone that a cheap matching proposes")
-    window: int = Field(9, ge=1, le=31, description="side of the window that proposals are matched over, px, odd")
-    votes: int = Field(9, ge=1, le=144, description="pixels a proposal needs, of 144 in and around a tile")
+    window: int = Field(7, ge=1, le=31, description="side of the window that proposals are matched over, px, odd")
+    votes: int = Field(6, ge=1, le=144, description="pixels a proposal needs, of 144 in and around a tile")
 
     @property
     def context(self) -> int:

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from stages.matching.candidates import candidates, context
+from stages.transforms.census import census_transform
 
 WINDOW = 5
 
@@ -58,8 +59,6 @@ def test_each_pixel_with_a_valid_cell_gets_one_and_no_tile_an_invalid_one(dispar
 @pytest.mark.parametrize("window", [1, 3, 9])
 def test_the_winners_are_those_of_a_direct_search(window: int) -> None:
     """One vote of a tile at the image's upper left corner: every disparity that wins near it is proposed."""
-    from stages.transforms.census import census_transform
-
     height, width, count = 4, 20, 5
     views = padded(texture(height, width), texture(height, width, seed=1), window)
     left, right = (census_transform(view, (7, 9)) for view in views[:, 0])
