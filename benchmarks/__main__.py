@@ -10,6 +10,7 @@ NAMES = (
     "transforms",
     "evaluation",
     "cost_volume",
+    "guided",
     "roofline",
     "training",
     "growth",

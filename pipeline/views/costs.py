@@ -53,7 +53,7 @@ def draw_costs(
     right.axvline(disparities[index], color="#606060", linestyle="--", zorder=0, label="the disparity of the slice")
     right.set_title(f"costs of the pixel y = {y}, x = {x} (ring)")
     handles, _ = right.get_legend_handles_labels()
-    legend_below(figure, [*handles, none_patch(costs, "no cost, right pixel outside the image")])
+    legend_below(figure, [*handles, none_patch(costs, "no cost: not judged, or right pixel outside the image")])
 
 
 def _pixel(cost: xr.DataArray, pixel: tuple[int, int] | None) -> tuple[int, int]:

@@ -61,7 +61,7 @@ _TOLD = {
     "channels": ("rank_window", "companion_window", "companion_rays"),
     "matching_samples": ("form", "samples"),
     "matching_net": ("head", "steps"),
-    "costvolume": ("d_min", "d_max", "precision"),
+    "costvolume": ("d_min", "d_max", "precision", "mode"),
     "disparity": ("subpixel",),
     "evaluation_samples": ("form", "samples", "tolerance"),
     "evaluation_net": ("steps",),

@@ -16,11 +16,12 @@ from torch.nn import functional
 
 from stages.allocator import keep_freed_memory
 from stages.matching.declaration import RADIUS, CostVolumeParams
-from stages.matching.net import SIDES, MatchingNet, net_from_parameters
+from stages.matching.guided import padded_guided_costs
+from stages.matching.net import SIDES, MatchingNet, net_from_parameters, require_views
 from stages.matching.transformed import TransformedNet, is_transformable, run_block
 from stages.matching.winograd import TILE
 from stages.precision import Precision, autocast
-from stages.stage import Inputs, StageError, require_shape
+from stages.stage import Inputs, require_shape
 from stages.training import one_thread
 
 ROWS, COLUMNS = 32, 64
@@ -72,8 +73,7 @@ def padded_cost_volume(
     As ``cost_volume``, for (view, channel, y + 10, x + 10): rows of a larger image with their
     neighbours, its whole width with its edge repeated.
     """
-    if channels.shape[:2] != (2, net.channels):
-        raise StageError(f"matching-Net expects 2 views of {net.channels} channels, got {channels.shape[:2]}")
+    require_views(net, channels)
     height, width = (length - 2 * RADIUS for length in channels.shape[2:])
     volume = np.full((height, width, len(disparities)), np.nan, np.float32)
     keep_freed_memory()
@@ -133,5 +133,8 @@ def compute_costs(params: CostVolumeParams, inputs: Inputs) -> dict[str, NDArray
     """Return one tile of the volume: ``cost`` float16 (y, x, d) and its coordinate ``d`` int16."""
     channels = inputs["channels"]["channels"]
     net = net_from_parameters(inputs["matching_net"]["parameters"], channels.shape[1])
-    costs = padded_cost_volume(net, channels, params.disparities, params.precision)
+    if params.mode == "guided":
+        costs = padded_guided_costs(net, channels, params.disparities, params.window, params.votes, params.precision)
+    else:
+        costs = padded_cost_volume(net, channels, params.disparities, params.precision)
     return {"cost": costs.astype(np.float16), "d": np.array(params.disparities, np.int16)}

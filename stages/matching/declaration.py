@@ -1,8 +1,8 @@
 """What the matching-Net's three products are made from, and what can be set. Light: it does not load torch."""
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from stages.precision import Precision
 from stages.schedule import SHARDS, Schedule
@@ -10,9 +10,14 @@ from stages.stage import Output, Params, Stage, StageError
 
 Form = Literal["dense", "patch"]
 Head = Literal["compact", "paper"]
+Mode = Literal["exact", "guided"]
 PATCH = 11
 """Side of the square patch that one answer of the matching-Net depends on, in pixels."""
 RADIUS = PATCH // 2
+CENSUS = (7, 9)
+"""Rows and columns of the signatures that propose cells to a guided volume."""
+MARGIN = 4 + CENSUS[1] // 2
+"""Pixels around a tile that propose to it, and half a signature."""
 
 
 class MatchingSamplesParams(Params):
@@ -57,6 +62,14 @@ class CostVolumeParams(Params):
     d_min: int | None = Field(None, description="smallest disparity, px; default: the scene's own")
     d_max: int | None = Field(None, description="largest disparity, px; default: the scene's own")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
+    mode: Mode = Field("exact", description="every cell, or those alone that a cheap matching proposes")
+    window: int = Field(7, ge=1, le=31, description="side of the window that proposals are matched over, px, odd")
+    votes: int = Field(6, ge=1, le=144, description="pixels a proposal needs, of 144 in and around a tile")
+
+    @property
+    def context(self) -> int:
+        """Pixels that a cell looks away from its own."""
+        return RADIUS if self.mode == "exact" else MARGIN + self.window // 2
 
     @property
     def disparities(self) -> range:
@@ -73,8 +86,18 @@ class CostVolumeParams(Params):
     def _ordered(self) -> "CostVolumeParams":
         if self.d_min is not None and self.d_max is not None and self.d_max < self.d_min:
             raise ValueError(f"d_max {self.d_max} lies below d_min {self.d_min}")
+        if self.window % 2 == 0:
+            raise ValueError(f"window is {self.window} px, expected an odd number")
         return self
 
+    @model_serializer(mode="wrap")
+    def _that_matter(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what an exact volume does not depend on: it is in no key of one."""
+        fields: dict[str, Any] = dump(self)
+        return {name: value for name, value in fields.items() if self.mode != "exact" or name not in _GUIDING}
+
+
+_GUIDING = ("mode", "window", "votes")
 
 MATCHING_SAMPLES = Stage(
     product="matching_samples",
@@ -117,7 +140,7 @@ COST_VOLUME = Stage(
     compute="stages.matching.cost_volume:compute_costs",
     params=CostVolumeParams,
     tile_rows=32,
-    halo=lambda _: RADIUS,
+    halo=lambda params: params.context,
     border="edge",
     sizes=lambda params: {"d": len(params.disparities)},
 )

@@ -134,6 +134,16 @@ class MatchingNet(nn.Module):
         return (self.out.bias[1] - self.out.bias[0]).float()
 
 
+def require_views(net: MatchingNet, views: NDArray[np.float32]) -> None:
+    """Refuse views (view, channel, y, x) that do not fit the network.
+
+    Raises:
+        StageError: naming what was expected.
+    """
+    if views.shape[:2] != (2, net.channels):
+        raise StageError(f"matching-Net expects 2 views of {net.channels} channels, got {views.shape[:2]}")
+
+
 def net_from_parameters(parameters: NDArray[np.float32], channels: int) -> MatchingNet:
     """Return the network that a vector of parameters belongs to, ready for inference.
 

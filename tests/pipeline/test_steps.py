@@ -168,6 +168,15 @@ def test_what_is_left_open_is_filled_in_from_the_scene() -> None:
     assert (settings["d_min"], settings["d_max"]) == (0, 8)
     assert settings["precision"] in ("float32", "bfloat16")
     assert settings["tiles"] == "32 rows, halo 5, edge"
+    assert set(settings) == {"d_min", "d_max", "precision", "tiles"}, "a guided volume's settings are in no other's key"
+
+
+def test_a_guided_volume_is_another_product() -> None:
+    exact, guided = (
+        find(graph(*settings, upto="costvolume"), "costvolume") for settings in ((), ("costvolume.mode=guided",))
+    )
+    assert exact.id != guided.id and guided.settings["mode"] == "guided"
+    assert guided.settings["tiles"] == "32 rows, halo 11, edge"
 
 
 def test_a_range_of_the_user_s_own_wins() -> None:

@@ -1,18 +1,18 @@
 import numpy as np
 import pytest
 
-from stages.baselines.census import census_transform, hamming
+from stages.transforms.census import census_transform, hamming
 
 
 def test_a_bit_is_set_for_each_darker_neighbour() -> None:
     gray = np.full((7, 9), 5, np.uint8)
     gray[0, 0], gray[6, 8] = 4, 3
-    signature = int(census_transform(gray)[3, 4])
+    signature = int(census_transform(gray, (7, 9))[3, 4])
     assert signature == (1 << 61) | 1, "the first neighbour is the highest of 62 bits, the last the lowest"
 
 
 def test_neighbours_beyond_the_image_are_not_darker() -> None:
-    assert not census_transform(np.full((5, 6), 200, np.uint8)).any()
+    assert not census_transform(np.full((5, 6), 200, np.uint8), (7, 9)).any()
 
 
 @pytest.mark.parametrize(

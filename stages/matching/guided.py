@@ -1,0 +1,93 @@
+"""The guided cost volume: the exact one in the cells that can win, nothing in the others.
+
+A cheap matching proposes disparities to each tile of 4 x 4 px (see ``candidates``), and the network judges these
+(see ``sparse``). A cell that was not judged is NaN, as one whose right pixel lies outside the image is, so that
+whatever reads a volume passes over both; they differ in that ``x - d`` is a column of the image for the former.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from stages.allocator import keep_freed_memory
+from stages.matching.candidates import Tiles, candidates, context
+from stages.matching.declaration import RADIUS
+from stages.matching.net import MatchingNet, require_views
+from stages.matching.sparse import BATCH, judge_tiles
+from stages.matching.winograd import TILE
+from stages.precision import Precision, autocast
+from stages.stage import require_shape
+from stages.training import one_thread
+
+COLUMNS = 64
+"""Columns of tiles gone through at all disparities before the next: what they meet in the views stays in the cache."""
+
+
+def guided_cost_volume(
+    net: MatchingNet,
+    channels: NDArray[np.float32],
+    disparities: range,
+    window: int,
+    votes: int,
+    precision: Precision = "float32",
+) -> NDArray[np.float32]:
+    """Return the matching costs of a whole pair in the cells that can win.
+
+    Args:
+        net: the matching-Net.
+        channels: float32 (view, channel, y, x), left view first; the first channel proposes.
+        disparities: consecutive disparities, px; may be negative.
+        window: side of the square that the proposals match, px, odd.
+        votes: pixels that a proposal needs.
+        precision: arithmetic of the convolutions.
+
+    Returns:
+        float32 (y, x, d): log-odds of a mismatch; NaN where a cell was not judged or its right pixel is outside the
+        image. A pixel with any valid cell has a cost in at least one.
+
+    Raises:
+        StageError: if the channels do not fit the network.
+    """
+    require_shape("channels", channels, 4)
+    margin = (context(window),) * 2
+    padded = np.pad(channels, ((0, 0), (0, 0), margin, margin), mode="edge")
+    return padded_guided_costs(net, padded, disparities, window, votes, precision)
+
+
+def padded_guided_costs(
+    net: MatchingNet,
+    channels: NDArray[np.float32],
+    disparities: range,
+    window: int,
+    votes: int,
+    precision: Precision = "float32",
+) -> NDArray[np.float32]:
+    """As ``guided_cost_volume``, of views that bring ``context(window)`` px of context on every side."""
+    require_views(net, channels)
+    margin = context(window)
+    height, width = (length - 2 * margin for length in channels.shape[2:])
+    chosen = candidates(channels, disparities, window, votes)
+    volume = np.full((*(TILE * count for count in chosen.shape[:2]), len(disparities)), np.nan, np.float32)
+    tiles = volume.reshape(chosen.shape[0], TILE, chosen.shape[1], TILE, len(disparities))
+    keep_freed_memory()
+    one_thread()
+    with torch.inference_mode(), autocast(precision):
+        own = slice(margin - RADIUS, RADIUS - margin)
+        judge = judge_tiles(net, torch.from_numpy(np.ascontiguousarray(channels[:, :, own, own])), precision)
+        for row, column, index in _batches(chosen):
+            places = np.stack([row * TILE, column * TILE, index + disparities.start], 1)
+            tiles[row, :, column, :, index] = judge(places)
+    matched = np.arange(width)[:, None] - np.array(disparities)  # the right pixel's column
+    volume[:, :width][:, (matched < 0) | (matched >= width)] = np.nan
+    return np.ascontiguousarray(volume[:height, :width])
+
+
+def _batches(chosen: Tiles) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]]:
+    """Yield rows, columns and disparities of tiles, such that those of a batch lie near each other at one disparity."""
+    for first in range(0, chosen.shape[1], COLUMNS):
+        index, row, column = np.nonzero(chosen[:, first : first + COLUMNS].transpose(2, 0, 1))
+        for start in range(0, len(index), BATCH):
+            batch = slice(start, start + BATCH)
+            yield row[batch], column[batch] + first, index[batch]
