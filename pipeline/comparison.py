@@ -39,7 +39,9 @@ EXPERIMENTS = ("raw", "density", "auc")
 MATCHERS = {"SGM (OpenCV SGBM)": "sgm", "SNCC": "sncc", "census": "census", "MC-CNN fast": "mc_cnn"}
 """Other matchers, by name: their products have a ``dense`` map, and a ``disparity`` after their own checks."""
 MEASURES = {
-    "evaluation-Net": ("confidence", "confidence"),
+    "evaluation-Net and agreement": ("confidence", "confidence"),
+    "evaluation-Net": ("confidence", "network"),
+    "agreement": ("confidence", "agreement"),
     "APKR": ("cost_confidence", "apkr"),
     "O1": ("o1", "confidence"),
     "CCNN": ("ccnn", "confidence"),

@@ -156,8 +156,7 @@ def build(request: Request) -> Graph:
         builder = _Builder(graph, config, request)
         graph.targets += [(step_id, variant) for step_id in _targets(builder, trained_on)]
     # The order of the products is one in which each comes after its inputs, whichever scenes they belong to.
-    in_order = sorted(graph.steps.items(), key=lambda item: ALL_PRODUCTS.index(item[1].product))
-    graph.steps = dict(in_order)
+    graph.steps = dict(sorted(graph.steps.items(), key=lambda item: ALL_PRODUCTS.index(item[1].product)))
     graph.notes = list(dict.fromkeys(graph.notes))
     if not graph.targets:
         raise UsageError(f"{request.dataset.spec}: no scene is left to work on; {'; '.join(graph.notes)}")
@@ -177,8 +176,7 @@ def _targets(builder: "_Builder", trained_on: set[str]) -> Iterator[str]:
             notes.append(f"{scene.name} has no ground truth: there are no metrics for it")
             yield builder.product("images" if upto == "truth" else _known(scene, "semidense", notes), scene)
         else:
-            for product in (upto, *builder.request.also):
-                yield builder.product(_known(scene, product, notes), scene)
+            yield from (builder.product(_known(scene, each, notes), scene) for each in (upto, *builder.request.also))
 
 
 def needs_range(product: str) -> bool:

@@ -67,7 +67,7 @@ def weigh_in(log_odds: NDArray[np.float32], agreement: NDArray[np.float32], weig
     >>> weigh_in(np.float32([0, 0]), np.float32([1, 0.5]), weight=1.0).tolist()
     [0.5, 0.3333333432674408]
     """
-    return sigmoid(log_odds + np.float32(weight) * np.log(agreement))
+    return sigmoid((log_odds + np.float32(weight) * np.log(agreement)).astype(np.float32))
 
 
 def compute_confidence(params: ConfidenceParams, inputs: Inputs) -> dict[str, NDArray[np.float32]]:
