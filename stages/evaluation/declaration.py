@@ -46,9 +46,9 @@ class ConfidenceParams(Params):
     """How the evaluation-Net runs, and how much the map's agreement weighs beside it."""
 
     agreement: float = Field(
-        3.0, ge=0, le=100, description="power of the map's agreement by which the odds are multiplied; 0 is the paper"
+        4.0, ge=0, le=100, description="power of the map's agreement by which the odds are multiplied; 0 is the paper"
     )
-    window: int = Field(17, ge=1, le=PATCH, description="side of the window of the agreement, px, odd")
+    window: int = Field(25, ge=1, le=PATCH, description="side of the window of the agreement, px, odd")
     flipped: bool = Field(False, description="look upside down too, and take the mean; twice the time")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
 

@@ -96,7 +96,7 @@ def test_the_stage_is_the_network_on_the_layers_of_the_left_view() -> None:
     made = whole(CONFIDENCE, ConfidenceParams(precision="float32"), given, DIMS)
     assert list(made) == [output.name for output in CONFIDENCE.outputs]
     assert np.abs(made["network"] - confidence(random_net(), layers)).max() <= 1e-5
-    assert np.array_equal(made["agreement"], agreement(given["disparity"]["disparity"], 17))
+    assert np.array_equal(made["agreement"], agreement(given["disparity"]["disparity"], ConfidenceParams().window))
 
 
 def test_agreement_weighs_in_by_its_power_and_not_at_all_in_the_paper_s_form() -> None:
