@@ -56,18 +56,21 @@ def sigmoid(log_odds: NDArray[np.float32]) -> NDArray[np.float32]:
     return result
 
 
-def weigh_in(log_odds: NDArray[np.float32], agreement: NDArray[np.float32], weight: float) -> NDArray[np.float32]:
-    """Return the confidence: the odds of the evaluation-Net, times the agreement to the power of ``weight``.
+def weigh_in(
+    log_odds: NDArray[np.float32], agreement: NDArray[np.float32], weight: float, typical: float
+) -> NDArray[np.float32]:
+    """Return the confidence: the odds of the evaluation-Net times ``(agreement / typical) ** weight``.
 
     Args:
         log_odds: float32 (y, x) of the evaluation-Net.
         agreement: float32 (y, x) in (0, 1] of the raw map.
         weight: 0 or more; at 0 the confidence is the evaluation-Net's probability, bit for bit.
+        typical: the agreement that leaves the odds as they are.
 
-    >>> weigh_in(np.float32([0, 0]), np.float32([1, 0.5]), weight=1.0).tolist()
+    >>> weigh_in(np.float32([0, 0]), np.float32([1, 0.5]), weight=1.0, typical=1.0).tolist()
     [0.5, 0.3333333432674408]
     """
-    return sigmoid((log_odds + np.float32(weight) * np.log(agreement)).astype(np.float32))
+    return sigmoid((log_odds + np.float32(weight) * np.log(agreement / np.float32(typical))).astype(np.float32))
 
 
 def compute_confidence(params: ConfidenceParams, inputs: Inputs) -> dict[str, NDArray[np.float32]]:
@@ -81,7 +84,7 @@ def compute_confidence(params: ConfidenceParams, inputs: Inputs) -> dict[str, ND
     log_odds = padded_log_odds(net, layers, params.precision, params.flipped)
     agreeing = padded_agreement(disparity, params.window)
     return {
-        "confidence": weigh_in(log_odds, agreeing, params.agreement),
+        "confidence": weigh_in(log_odds, agreeing, params.agreement, params.typical),
         "network": sigmoid(log_odds),
         "agreement": agreeing,
     }

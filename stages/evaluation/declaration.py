@@ -46,7 +46,13 @@ class ConfidenceParams(Params):
     """How the evaluation-Net runs, and how much the map's agreement weighs beside it."""
 
     agreement: float = Field(
-        4.0, ge=0, le=100, description="power of the map's agreement by which the odds are multiplied; 0 is the paper"
+        4.0, ge=0, le=100, description="weight of the map's agreement, a power of it; 0 is the paper"
+    )
+    typical: float = Field(
+        0.82,
+        gt=0,
+        le=1,
+        description="agreement that leaves the odds as they are: that of right disparities in training",
     )
     window: int = Field(25, ge=1, le=PATCH, description="side of the window of the agreement, px, odd")
     flipped: bool = Field(False, description="look upside down too, and take the mean; twice the time")

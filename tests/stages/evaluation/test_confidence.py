@@ -101,17 +101,21 @@ def test_the_stage_is_the_network_on_the_layers_of_the_left_view() -> None:
 
 def test_agreement_weighs_in_by_its_power_and_not_at_all_in_the_paper_s_form() -> None:
     plain, weighed = (
-        whole(CONFIDENCE, ConfidenceParams(precision="float32", agreement=weight, window=3), products(), DIMS)
+        whole(
+            CONFIDENCE, ConfidenceParams(precision="float32", agreement=weight, typical=0.9, window=3), products(), DIMS
+        )
         for weight in (0.0, 2.0)
     )
     assert np.array_equal(plain["confidence"], plain["network"])
-    odds = plain["network"] / (1 - plain["network"]) * plain["agreement"].astype(np.float64) ** 2
+    odds = plain["network"] / (1 - plain["network"]) * (plain["agreement"] / np.float64(0.9)) ** 2
     assert np.abs(weighed["confidence"] - odds / (1 + odds)).max() <= 1e-5
-    assert (weighed["confidence"] <= weighed["network"]).all()
+    less = weighed["agreement"] < 0.9
+    assert less.any() and not less.all()
+    assert np.array_equal(weighed["confidence"] < weighed["network"], less)
 
 
 def test_without_any_agreement_little_confidence_is_left() -> None:
-    assert weigh_in(np.float32([20.0]), np.float32([1 / 289]), 6.0)[0] < 1e-5
+    assert weigh_in(np.float32([20.0]), np.float32([1 / 289]), 6.0, 0.8)[0] < 1e-5
 
 
 @pytest.mark.parametrize("window", [pytest.param(16, id="even"), pytest.param(103, id="beyond the patch")])
