@@ -15,12 +15,17 @@ THRESHOLD_PX = 1.0
 def write_sweep(rows: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
     """Write ``sweep.csv`` with every row and ``sweep.png`` with the curve; return their paths.
 
+    Where no threshold keeps a pixel there is no curve, and no picture.
+
     Raises:
         UsageError: if the folder cannot be written.
     """
     writable_folder(folder)
     table, picture = folder / "sweep.csv", folder / "sweep.png"
     write_rows(rows, table)
+    picture.unlink(missing_ok=True)
+    if not any("bad" in row for row in rows):
+        return [table]
     save_png(error_curve_figure(rows, threshold=THRESHOLD_PX), picture)
     return [table, picture]
 

@@ -22,6 +22,13 @@ def test_the_table_has_every_row(rows: list[dict[str, object]], tmp_path: Path) 
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_without_a_pixel_kept_there_is_no_picture(rows: list[dict[str, object]], tmp_path: Path) -> None:
+    write_sweep(rows, tmp_path)
+    nothing = [{name: value for name, value in row.items() if name != "bad"} for row in rows]
+    assert write_sweep(nothing, tmp_path) == [tmp_path / "sweep.csv"]
+    assert not (tmp_path / "sweep.png").exists(), "not the one of an earlier sweep"
+
+
 def test_a_folder_that_cannot_be_written_is_refused(rows: list[dict[str, object]], tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UsageError, match="cannot be written"):

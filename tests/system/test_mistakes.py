@@ -35,7 +35,7 @@ def refused(ran: Any, *words: str) -> None:  # noqa: ANN401
         pytest.param(["run", "synthetic", "--scene", "test-9"], ["test-9", "did you mean test-"], id="no such scene"),
         pytest.param(["run", "--upto", "disparities"], ["did you mean disparity?"], id="no such product"),
         pytest.param(["run", "--force", "metric"], ["did you mean metrics?"], id="no such product to force"),
-        pytest.param(["explain", "costs", "synthetic"], ["costs", "costvolume"], id="no such product to explain"),
+        pytest.param(["explain", "costvol", "synthetic"], ["costvol'", "costvolume"], id="no such product to explain"),
         pytest.param(["run", "--set", "channels.window=3"], ["rank_window"], id="no such setting"),
         pytest.param(["run", "--set", "semidense.R=1.5"], ["semidense.R = 1.5", "1"], id="R above 1"),
         pytest.param(["run", "--set", "semidense.R=-1"], ["semidense.R = -1"], id="R below 0"),

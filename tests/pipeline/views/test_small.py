@@ -5,7 +5,8 @@ from pipeline.steps import PRODUCTS as ALL_PRODUCTS
 from pipeline.views.small import small_disparity, small_picture
 from tests.pipeline.views.products import PRODUCTS
 
-MAPS = {"images", "truth", "disparity", "semidense", "right_disparity", "refined", "filled", "confidence"}
+MAPS = {"images", "truth", "disparity", "semidense", "right_disparity", "refined", "filled"}
+MAPS |= {"confidence", "calibrated_confidence"}
 
 
 @pytest.mark.parametrize("product", ALL_PRODUCTS)
