@@ -7,6 +7,7 @@ from pydantic import Field, field_validator
 from stages.precision import Precision
 from stages.schedule import SHARDS, Schedule
 from stages.stage import Output, Params, Stage
+from stages.transforms.window import require_window
 
 PATCH = 101
 """Side of the square patch that one answer of the evaluation-Net stands for, in pixels."""
@@ -54,16 +55,14 @@ class ConfidenceParams(Params):
         le=1,
         description="agreement that leaves the odds as they are: that of right disparities in training",
     )
-    window: int = Field(25, ge=1, le=PATCH, description="side of the window of the agreement, px, odd")
+    window: int = Field(25, ge=3, le=PATCH, description="side of the window of the agreement, px, odd")
     flipped: bool = Field(False, description="look upside down too, and take the mean; twice the time")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
 
     @field_validator("window")
     @classmethod
     def _odd(cls, window: int) -> int:
-        if window % 2 == 0:
-            raise ValueError(f"{window} is even: a window has a middle pixel, so its side is odd")
-        return window
+        return require_window(window)
 
 
 EVALUATION_SAMPLES = Stage(
