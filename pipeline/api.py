@@ -118,7 +118,7 @@ def open_product(store: Store, key: str) -> "xr.Dataset":
     """Return a cached product as a lazy dataset.
 
     Rows and columns get coordinates in px. Beside ``cost``, the log-odds of a mismatch, a cost volume
-    offers its ``probability``.
+    offers its ``probability``. Each figure of ``metrics`` is an array of its own.
 
     Raises:
         CacheError: if the entry is missing or damaged.
@@ -131,7 +131,18 @@ def open_product(store: Store, key: str) -> "xr.Dataset":
         cost = dataset["cost"].astype("float32")
         probability = 1 / (1 + math.e ** (-cost))
         dataset["probability"] = probability.assign_attrs(units="1", long_name="probability of a mismatch")
-    return dataset
+    return _with_named_figures(dataset) if "figures" in dataset else dataset
+
+
+def _with_named_figures(dataset: "xr.Dataset") -> "xr.Dataset":
+    """Return the product ``metrics`` with an array (mask, threshold) for each figure."""
+    from stages.metrics.stage import FIGURES, MASKS, by_name
+
+    named = {
+        name: (("mask", "threshold"), values, {"units": FIGURES[name][1], "long_name": FIGURES[name][2]})
+        for name, values in by_name(dataset["figures"].values).items()
+    }
+    return dataset.drop_vars("figures").assign(named).assign_coords(mask=list(MASKS))
 
 
 def status(task: Task | str = "motorcycle", upto: str = "metrics", forced: Sequence[str] = ()) -> Plan:

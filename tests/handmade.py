@@ -75,4 +75,4 @@ def handmade(folder: Path, height: int = 60, width: int = 90, disparities: int =
 def judge(made: Handmade, confidence: NDArray[np.float32], variant: int) -> None:
     """Publish a confidence, and figures that tell which truth the scene has."""
     made.write("confidence", {"variant": variant}, ("images", "disparity"), confidence=confidence)
-    made.write("metrics", {}, ("disparity", "confidence", "truth"), threshold=np.zeros((1, 1)))
+    made.write("metrics", {}, ("disparity", "confidence", "truth"), figures=np.zeros((1, 1)))

@@ -16,7 +16,6 @@ MASKS = ("nonocc", "all")
 THRESHOLDS = (0.5, 1.0, 2.0, 4.0)
 """The order of the threshold axis, px of the image at hand."""
 
-DIMS = ("mask", "threshold")
 FIGURES = {
     "pixels": ("int64", "1", "pixels of the mask with a known truth"),
     "raw_bad": ("float64", "%", "wrong or unreported pixels of the map before filtering"),
@@ -31,7 +30,7 @@ FIGURES = {
     "auc": ("float64", "1", "area under the error curve of the confidence over the map before filtering"),
     "auc_optimal": ("float64", "1", "the area that a perfect confidence would reach"),
 }
-"""Every figure of the product: dtype, unit, meaning. Those that know no threshold are the same at each."""
+"""The order of the figure axis; dtype, unit and meaning of each. Those that know no threshold are the same at each."""
 _known: dict[bytes, list[list[dict[str, float]]]] = {}
 """Figures of maps before filtering, by a hash of all that they are made from."""
 _MOST_KNOWN = 100
@@ -54,14 +53,20 @@ def metric_rows(scene: str, method: str, R: float | None, arrays: Arrays) -> lis
         errors in percent (0-100), ``avgerr`` and ``rms`` in px, areas as fractions. A key whose figure does not apply
         (NaN, or R None) is absent.
     """
+    named = by_name(arrays["figures"])
     return [
         {"scene": scene, "method": method, "mask": mask, "threshold_px": float(threshold)}
         | ({} if R is None else {"R": R})
-        | {"pixels": int(arrays["pixels"][m, t])}
-        | {name: float(arrays[name][m, t]) for name in ROW if not np.isnan(arrays[name][m, t])}
+        | {"pixels": int(named["pixels"][m, t])}
+        | {name: float(named[name][m, t]) for name in ROW if not np.isnan(named[name][m, t])}
         for m, mask in enumerate(MASKS)
         for t, threshold in enumerate(arrays["threshold"])
     ]
+
+
+def by_name(figures: Array) -> dict[str, Array]:
+    """Return each of ``FIGURES``, in its own dtype, of an array (figure, mask, threshold)."""
+    return {name: values.astype(about[0]) for (name, about), values in zip(FIGURES.items(), figures, strict=True)}
 
 
 def compute_metrics(_: NoParams, inputs: Inputs) -> Arrays:
@@ -88,7 +93,7 @@ def compute_metrics(_: NoParams, inputs: Inputs) -> Arrays:
     ]
     return {
         "threshold": np.array(THRESHOLDS),
-        **{name: np.array([[cell[name] for cell in row] for row in table], FIGURES[name][0]) for name in FIGURES},
+        "figures": np.array([[[cell[name] for cell in row] for row in table] for name in FIGURES], np.float64),
     }
 
 
@@ -140,9 +145,10 @@ METRICS = Stage(
     inputs=("semidense", "disparity", "confidence", "truth"),
     outputs=(
         Output("threshold", ("threshold",), "float64", "px", "error above which a pixel is wrong"),
-        *(Output(name, DIMS, *about) for name, about in FIGURES.items()),
+        # One array: as one each, the figures would take more time to store than to work out.
+        Output("figures", ("figure", "mask", "threshold"), "float64", "1", ", ".join(FIGURES)),
     ),
     compute="stages.metrics.stage:compute_metrics",
 )
-"""The figures of a scene, masks in the order of ``MASKS``. ``truth`` has ``disparity`` (y, x) float32, NaN unknown, and
-``nonocc`` (y, x) bool. Not tiled: a quantile and a ranking are not sums over tiles."""
+"""The figures of a scene, in the order of ``FIGURES``, masks in that of ``MASKS``. ``truth`` has ``disparity`` (y, x)
+float32, NaN unknown, and ``nonocc`` (y, x) bool. Not tiled: a quantile and a ranking are not sums over tiles."""

@@ -78,6 +78,15 @@ def test_a_result_is_found_by_product_and_scene(trained: Result) -> None:
     assert trained.find("matching_net").step.product == "matching_net"
 
 
+def test_the_figures_of_opened_metrics_have_names_and_units(trained: Result) -> None:
+    opened = trained.open("metrics")
+    row = next(row for row in trained.metrics if (row["mask"], row["threshold_px"]) == ("all", 1.0))
+    assert "figures" not in opened
+    for name in ("raw_bad", "invalid", "auc", "pixels"):
+        assert opened[name].sel(mask="all", threshold=1.0).item() == row[name]
+    assert opened["raw_bad"].attrs["units"] == "%" and opened["pixels"].dtype == "int64"
+
+
 @pytest.mark.parametrize(
     ("product", "scene", "message"),
     [

@@ -19,6 +19,7 @@ from stages.metrics import (
     rms,
     stage,
 )
+from stages.metrics.stage import FIGURES, by_name
 from stages.metrics.stage import compute_metrics as compute
 from stages.stage import NoParams, StageError
 from tests.stages.tiling import same
@@ -45,9 +46,13 @@ def products(R: float = 0.5) -> dict[str, dict[str, np.ndarray]]:
     }
 
 
+def figures(given: dict[str, dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    return by_name(METRICS.function()(NoParams(), given)["figures"])
+
+
 def test_every_figure_is_that_of_its_function() -> None:
     given = products()
-    made = METRICS.function()(NoParams(), given)
+    made = figures(given)
     truth, semidense, disparity = (given[name]["disparity"] for name in ("truth", "semidense", "disparity"))
     for m, mask in enumerate((given["truth"]["nonocc"], np.ones(truth.shape, bool))):
         counts = mask & ~np.isnan(truth)
@@ -73,12 +78,15 @@ def test_every_figure_is_that_of_its_function() -> None:
 def test_makes_what_it_declares() -> None:
     made = METRICS.function()(NoParams(), products())
     assert list(made) == [output.name for output in METRICS.outputs]
-    sizes = {"mask": len(MASKS), "threshold": len(THRESHOLDS)}
+    sizes = {"figure": len(FIGURES), "mask": len(MASKS), "threshold": len(THRESHOLDS)}
     for output in METRICS.outputs:
         assert made[output.name].dtype == output.dtype
         assert made[output.name].shape == tuple(sizes[dim] for dim in output.dims)
     assert made["threshold"].tolist() == [0.5, 1, 2, 4]
     assert METRICS.tile_rows is None
+    assert {name: values.dtype for name, values in by_name(made["figures"]).items()} == {
+        name: dtype for name, (dtype, _, _) in FIGURES.items()
+    }
 
 
 def test_is_deterministic() -> None:
@@ -86,7 +94,7 @@ def test_is_deterministic() -> None:
 
 
 def test_raw_error_and_area_do_not_depend_on_the_filter() -> None:
-    few, many = (METRICS.function()(NoParams(), products(R)) for R in (0.9, 0.1))
+    few, many = (figures(products(R)) for R in (0.9, 0.1))
     for name in ("raw_bad", "auc", "auc_optimal", "pixels"):
         assert np.array_equal(few[name], many[name])
     assert (few["invalid"] > many["invalid"]).all()
@@ -96,16 +104,16 @@ def test_raw_error_and_area_do_not_depend_on_the_filter() -> None:
 def test_without_ground_truth_all_is_nan_and_no_pixel_counts() -> None:
     given = products()
     given["truth"]["disparity"] = np.full((40, 30), N, np.float32)
-    made = METRICS.function()(NoParams(), given)
-    assert not made["pixels"].any()
-    assert all(np.isnan(made[name]).all() for name in made if name not in ("pixels", "threshold"))
+    made = figures(given)
+    assert not made.pop("pixels").any()
+    assert all(np.isnan(values).all() for values in made.values())
 
 
 @pytest.mark.filterwarnings("error")
 def test_when_nothing_is_reported() -> None:
     given = products()
     given["semidense"]["disparity"] = given["disparity"]["disparity"] = np.full((40, 30), N, np.float32)
-    made = METRICS.function()(NoParams(), given)
+    made = figures(given)
     assert (made["raw_bad"] == 100).all() and (made["invalid"] == 100).all() and np.isnan(made["bad"]).all()
     assert made["auc"] == pytest.approx(1) and (made["auc_optimal"] == 1).all()
 
@@ -115,7 +123,8 @@ def test_rows_are_those_promised() -> None:
     rows = metric_rows("Teddy", "ours", 0.5, made)
     assert [(row["mask"], row["threshold_px"]) for row in rows] == [(m, t) for m in MASKS for t in (0.5, 1, 2, 4)]
     assert all(tuple(row) == ROW for row in rows)
-    assert rows[5]["raw_bad"] == made["raw_bad"][1, 1] and rows[5]["pixels"] == made["pixels"][1, 1]
+    named = by_name(made["figures"])
+    assert rows[5]["raw_bad"] == named["raw_bad"][1, 1] and rows[5]["pixels"] == named["pixels"][1, 1]
     assert (rows[0]["scene"], rows[0]["method"], rows[0]["R"]) == ("Teddy", "ours", 0.5)
     assert json.loads(json.dumps(rows, allow_nan=False)) == rows
 
@@ -146,7 +155,7 @@ def test_a_sweep_ranks_the_pixels_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stage.Ranking, "of", lambda confidence: ranked.append(confidence) or plain(confidence))
     made = [compute(NoParams(), products(R)) for R in (0.2, 0.5, 0.8)]
     assert len(ranked) == len(MASKS)
-    assert not np.array_equal(made[0]["invalid"], made[1]["invalid"])
+    assert not same(made[0], made[1])
     monkeypatch.setattr(stage, "_known", {})
     assert same(made[2], compute(NoParams(), products(0.8)))
 
@@ -164,4 +173,4 @@ def test_what_was_ranked_for_other_arrays_is_not_taken(
     after = compute(NoParams(), other)
     monkeypatch.setattr(stage, "_known", {})
     assert same(after, compute(NoParams(), other))
-    assert not np.array_equal(after["auc"], compute(NoParams(), before)["auc"])
+    assert not np.array_equal(figures(other)["auc"], figures(before)["auc"])
