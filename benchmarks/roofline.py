@@ -1,11 +1,13 @@
 """The cost volume against the machine's own limits, in the same run: ``python -m benchmarks.roofline``.
 
-Two limits: the rate of bare convolutions of the network's two large shapes, and the rate of bare batched matrix
-products of the shapes that the transformed convolutions multiply (see ``stages.matching.transformed``). The stage
-counts whole: reading the channels from the cache, everything between, writing and publishing. All run on one thread.
+The limits: the rate of bare convolutions of the network's two large shapes, also with 8-bit integers, and the rate of
+bare batched matrix products of the shapes that the transformed convolutions multiply (see
+``stages.matching.transformed``). The stage counts whole: reading the channels from the cache, everything between,
+writing and publishing. All run on one thread.
 """
 
 import tempfile
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -43,6 +45,31 @@ def bare_convolutions(dtype: torch.dtype) -> tuple[Callable[[], None], float]:
     return work, 2 * (36 * 68 * 9 * 384 * 64 + 32 * 64 * 25 * 64 * 128)
 
 
+def integer_convolutions() -> tuple[Callable[[], None], float]:
+    """Return both large convolutions on a block in 8-bit integers, as torch has them, and their operations."""
+    kernels = torch.ops.quantized
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # torch announces that its integer tensors will change their place
+        wide, narrow = (
+            torch.quantize_per_tensor(
+                torch.rand(shape).contiguous(memory_format=torch.channels_last), 0.01, 0, torch.quint8
+            )
+            for shape in ((1, 384, 38, 70), (1, 64, 36, 68))
+        )
+        first, second = (
+            kernels.conv2d_prepack(
+                torch.quantize_per_tensor(torch.randn(shape), 0.02, 0, torch.qint8), None, [1, 1], [0, 0], [1, 1], 1
+            )
+            for shape in ((64, 384, 3, 3), (128, 64, 5, 5))
+        )
+
+    def work() -> None:
+        kernels.conv2d_relu(wide, first, 0.5, 0)
+        kernels.conv2d_relu(narrow, second, 0.5, 0)
+
+    return work, 2 * (36 * 68 * 9 * 384 * 64 + 32 * 64 * 25 * 64 * 128)
+
+
 def bare_products() -> tuple[Callable[[], None], float]:
     """Return the batched matrix products of a block, and their operations."""
     joined, features = torch.randn(36, TILES, 128), torch.randn(64, TILES, 64)
@@ -69,6 +96,7 @@ def main() -> None:
     cells = HEIGHT * sum(end - first for first, end in (valid_columns(d, WIDTH) for d in range(DISPARITIES + 1)))
     dtypes = [torch.float32, *([torch.bfloat16] if fast_bfloat16() else [])]
     convolutions = {str(dtype): bare_convolutions(dtype) for dtype in dtypes}
+    convolutions["int8"] = integer_convolutions()
     products = bare_products()
     shares: dict[str, list[float]] = {}
     with tempfile.TemporaryDirectory() as folder:

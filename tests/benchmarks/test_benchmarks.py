@@ -1,13 +1,18 @@
 """Each benchmark on the smallest input: it runs, prints its table and leaves its JSON. What it measures is no test."""
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from benchmarks import cost_volume, growth, memory, peers, timeline, training, transforms, workers
+from benchmarks import agreement, cost_volume, growth, memory, peers, timeline, training, transforms, workers
 from benchmarks.harness import Ratio, compare
+from pipeline.api import Result, Task, run
+from stages.metrics import auc
+from tests.tiny import SETTINGS, SPEC
 
 TINY = "synthetic:train=0,test=1,height=48,width=64,disparities=4"
 
@@ -58,6 +63,26 @@ def test_the_matchers_are_told_with_their_errors_and_drawn(tmp_path: Path, capsy
     found = json.loads((tmp_path / "build" / "bench" / "matchers.json").read_text())["matchers"]
     assert all(0 <= each["raw_bad"] <= 100 and each["seconds"] > 0 for each in found.values())
     assert (tmp_path / "p.png").stat().st_size > 1000
+
+
+def test_the_choice_of_the_agreement_is_a_table(
+    trained: Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cache = shutil.copytree(trained.store.root, tmp_path / "cache")
+    agreement.main(SPEC, cache, window=[9], setting=list(SETTINGS))
+    assert "weight 4" in capsys.readouterr().out
+    found = json.loads((tmp_path / "build" / "bench" / "agreement.json").read_text())
+    assert found["scenes"] == ["train-0", "train-1"]
+    assert found["auc, optimal"] - 0.01 <= min(found["auc"]["9"]) and max(found["auc"]["9"]) <= 1
+    # Weight 0 is the evaluation-Net alone, as the folds' networks answer.
+    result = run(Task(SPEC, settings=SETTINGS, train=True, cache=cache), "calibration")
+    areas = []
+    for scene in ("train-0", "train-1"):
+        truth, disparity = result.open("truth", scene), result.open("disparity", scene)["disparity"].values
+        counted = truth["nonocc"].values & np.isfinite(truth["disparity"].values)
+        right = np.abs(disparity - truth["disparity"].values) <= 1
+        areas.append(auc(result.open("confidence", scene)["network"].values[counted], right[counted]))
+    assert found["auc"]["9"][0] == pytest.approx(np.mean(areas), abs=1e-3)
 
 
 def test_a_time_line_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

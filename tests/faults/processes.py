@@ -215,7 +215,7 @@ def crowds(scale: float) -> Tally:
     tally, chance = Tally(), random.Random(8)
     made = Counter[str]()
     runs = 0
-    for number in range(max(2, int(12.5 * scale))):
+    for number in range(max(2, int(13 * scale))):
         with world.folder() as root:
             crowd = 8 if scale >= 1 else 4
             offsets = [(0, *sorted(chance.sample(range(3), 2))) for _ in range(crowd)]
