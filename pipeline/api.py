@@ -2,7 +2,6 @@
 
 import functools
 import itertools
-import math
 import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,6 +16,7 @@ from datasets import Dataset, SceneSource, open_dataset
 from pipeline.attempts import attempt
 from pipeline.config import Config, parse_setting
 from pipeline.errors import UsageError
+from pipeline.opening import open_product
 from pipeline.plan import Plan, Planned, make_plan
 from pipeline.ranges import close_ranges
 from pipeline.steps import Request
@@ -112,37 +112,6 @@ class Result:
     def open(self, product: str, scene: str | None = None) -> "xr.Dataset":
         """Return a product as a lazy dataset with coordinates, units and provenance; see ``open_product``."""
         return open_product(self.store, self.find(product, scene).key)
-
-
-def open_product(store: Store, key: str) -> "xr.Dataset":
-    """Return a cached product as a lazy dataset.
-
-    Rows and columns get coordinates in px. Beside ``cost``, the log-odds of a mismatch, a cost volume
-    offers its ``probability``. Each figure of ``metrics`` is an array of its own.
-
-    Raises:
-        CacheError: if the entry is missing or damaged.
-    """
-    dataset = store.open(key)
-    for dim in ("y", "x"):
-        if dim in dataset.sizes:
-            dataset = dataset.assign_coords({dim: (dim, range(dataset.sizes[dim]), {"units": "px"})})
-    if "cost" in dataset:
-        cost = dataset["cost"].astype("float32")
-        probability = 1 / (1 + math.e ** (-cost))
-        dataset["probability"] = probability.assign_attrs(units="1", long_name="probability of a mismatch")
-    return _with_named_figures(dataset) if "figures" in dataset else dataset
-
-
-def _with_named_figures(dataset: "xr.Dataset") -> "xr.Dataset":
-    """Return the product ``metrics`` with an array (mask, threshold) for each figure."""
-    from stages.metrics.stage import FIGURES, MASKS, by_name
-
-    named = {
-        name: (("mask", "threshold"), values, {"units": FIGURES[name][1], "long_name": FIGURES[name][2]})
-        for name, values in by_name(dataset["figures"].values).items()
-    }
-    return dataset.drop_vars("figures").assign(named).assign_coords(mask=list(MASKS))
 
 
 def status(task: Task | str = "motorcycle", upto: str = "metrics", forced: Sequence[str] = ()) -> Plan:

@@ -8,9 +8,9 @@ from rich.console import Console
 from rich.table import Table
 
 from cache import Store
-from pipeline.api import open_product
 from pipeline.console import print_json, why
 from pipeline.errors import UsageError
+from pipeline.opening import open_product
 from pipeline.plan import Planned
 
 if TYPE_CHECKING:

@@ -31,7 +31,6 @@ from typing import Any
 import numpy as np
 
 from datasets.formats.ply import write_ply
-from pipeline.api import open_product
 from pipeline.errors import UsageError
 from pipeline.exporter import writable_folder
 from pipeline.map_files import (
@@ -46,6 +45,7 @@ from pipeline.map_files import (
     write_map,
 )
 from pipeline.naming import safe_names
+from pipeline.opening import open_product
 from pipeline.pairs import Match
 from pipeline.tasks import provenance
 from pipeline.views.png import explaining, write_rgb

@@ -86,7 +86,7 @@ def figure(
 
     Args:
         product: its name, such as ``semidense``.
-        dataset: the product, as ``pipeline.api.open_product`` gives it. Of a cost volume, slices are read alone.
+        dataset: the product, as ``pipeline.opening.open_product`` gives it. Of a cost volume, slices are read alone.
         title: stands above, taken literally; ``product_title`` makes one.
         pixel: of a cost volume, row and column of the pixel whose curve is drawn; None for one near the centre.
         disparity: of a cost volume, the disparity of the slice, px; None for the usual one in the middle rows.

@@ -25,7 +25,7 @@ def small_picture(product: str, dataset: xr.Dataset) -> Small | None:
 
     Args:
         product: its name.
-        dataset: as ``pipeline.api.open_product`` gives it; every n-th pixel is read.
+        dataset: as ``pipeline.opening.open_product`` gives it; every n-th pixel is read.
     """
     maps = [name for name in ("disparity", "confidence") if name in dataset and dataset[name].dims == ("y", "x")]
     if product != "images" and not maps:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from pipeline import api
-from pipeline.api import Result, Task, open_product, open_store, parse_thresholds
+from pipeline.api import Result, Task, open_store, parse_thresholds
 from pipeline.errors import UsageError
+from pipeline.opening import open_product
 
 MakePair = Callable[[Path], Path]
 

@@ -13,6 +13,7 @@ from pipeline import api
 from pipeline.api import Result, Task
 from pipeline.errors import StageFailed, StageRefused
 from pipeline.execute import execute
+from pipeline.opening import open_product
 from pipeline.steps import Graph
 from pipeline.tasks import Made, Unwatched
 from tests.pipeline.toy import BLURRED, chain
@@ -87,4 +88,4 @@ def test_a_stage_that_fails_on_a_cluster_is_named_and_leaves_nothing(
 def computed_here(store: Store, made: dict[str, Made]) -> np.ndarray:
     """Compute something with Dask after a run on a cluster."""
     (key,) = (each.key for each in made.values() if each.step.product == "blurred")
-    return api.open_product(store, key)["values"].values
+    return open_product(store, key)["values"].values
