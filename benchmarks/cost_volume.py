@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.guided import Side
 from benchmarks.harness import FOLDER, PAIRS, Ratio, median_seconds, report, timed, write
 from benchmarks.peers import AccurateMatcher, PeerError
 from datasets import Scene, open_dataset
@@ -25,8 +26,11 @@ from stages.baselines.declaration import SgmParams
 from stages.baselines.sgm import match_semi_global
 from stages.disparity import winner_take_all
 from stages.matching.cost_volume import cost_volume
+from stages.matching.declaration import CostVolumeParams
 from stages.matching.net import net_from_parameters
 from stages.metrics import raw_bad
+from stages.precision import resolve
+from stages.training import one_thread
 from stages.transforms.channels import channels
 from stages.transforms.gray import to_gray
 
@@ -46,6 +50,7 @@ def main(
     picture: Annotated[Path, typer.Option()] = PICTURE,
 ) -> None:
     """Print the ratio and the table, write both as JSON, draw the picture."""
+    one_thread()
     scene = open_dataset("motorcycle").scenes[0].load()
     ratios = list(_against_accurate(scene, crop, pairs)) if install else []
     matchers = _matchers(scene, rows, pairs)
@@ -61,6 +66,14 @@ def main(
 def _volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float32]:
     net = net_from_parameters(read_shipped_weights("matching_net", {})["parameters"], 3)
     return cost_volume(net, channels(left, right), disparities)
+
+
+def _guided_volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float16]:
+    params = CostVolumeParams(d_min=disparities[0], d_max=disparities[-1], mode="guided", precision=resolve("auto"))
+    net = {"parameters": read_shipped_weights("matching_net", {})["parameters"]}
+    side = Side(params, channels(left, right), range(left.shape[0]), net)
+    side()
+    return side.volume
 
 
 def _against_accurate(scene: Scene, crop: tuple[int, int, int], pairs: int) -> list[Ratio]:
@@ -92,6 +105,7 @@ def _matchers(scene: Scene, rows: int, pairs: int) -> dict[str, dict[str, float]
     sgm = SgmParams(d_min=disparities[0], d_max=disparities[-1])
     maps: dict[str, Map] = {
         "this project, exact": lambda: winner_take_all(_volume(left, right, disparities), disparities[0]),
+        "this project, guided": lambda: winner_take_all(_guided_volume(left, right, disparities), disparities[0]),
         **_fast_matchers(gray, disparities),
         "OpenCV SGBM, checked": lambda: match_semi_global(*gray, sgm, checked=True),
     }

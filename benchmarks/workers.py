@@ -14,9 +14,9 @@ MADE = ("images", "truth", *(stage.product for stage in CATALOG if stage.scope =
 
 
 def main(
-    rows: Annotated[int, typer.Option()] = 128,
-    columns: Annotated[int, typer.Option()] = 256,
-    disparities: Annotated[int, typer.Option()] = 16,
+    rows: Annotated[int, typer.Option()] = 256,
+    columns: Annotated[int, typer.Option()] = 320,
+    disparities: Annotated[int, typer.Option()] = 24,
     pairs: Annotated[int, typer.Option()] = PAIRS,
 ) -> None:
     """Compare whole runs, networks excepted."""

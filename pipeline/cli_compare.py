@@ -33,6 +33,9 @@ def compare(
             "--train-on", help="Train on this dataset what must be trained: O1, CCNN, networks of fewer channels."
         ),
     ] = None,
+    threshold: Annotated[
+        float, typer.Option("--threshold", help="Error in px above which tables and figures call a pixel wrong.")
+    ] = 1.0,
     settings: SetOption = None,
     config: ConfigOption = None,
     output: Annotated[
@@ -48,17 +51,22 @@ def compare(
     The paper's experiments: raw maps, error at equal density, confidence measures.
     """
     from pipeline import api, comparison, comparison_report, console
+    from pipeline.errors import UsageError
     from pipeline.progress import ProgressWatch
+    from stages.metrics import THRESHOLDS
 
+    if threshold not in THRESHOLDS:
+        offered = ", ".join(f"{each:g}" for each in THRESHOLDS)
+        raise UsageError(f"--threshold {threshold:g}: figures are worked out for {offered} px")
     task = api.Task(dataset, tuple(scene or ()), tuple(settings or ()), config, False, cache)
     experiments = experiment or comparison.EXPERIMENTS
     with ProgressWatch() as watch:
         found = comparison.compare(task, experiments, train_on, watch=watch, scheduler=scheduler, workers=workers)
-    files = comparison_report.write_comparison(found, output)
+    files = comparison_report.write_comparison(found, output, threshold)
     if as_json:
         console.print_json(comparison_report.as_json(found, files))
         return
-    comparison_report.print_comparison(found, api.mask_kinds(found.result).values())
+    comparison_report.print_comparison(found, api.mask_kinds(found.result).values(), threshold)
     console.print_notes(found.notes)
     for file in files:
         typer.echo(f"wrote {file}")

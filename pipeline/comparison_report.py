@@ -23,7 +23,7 @@ from pipeline.views.png import explaining, save_png
 from pipeline.views.sheets import sheets
 
 MASK, THRESHOLD = "nonocc", 1.0
-"""Mask, and threshold in px of the image at hand, of tables and figures; the files have all."""
+"""Mask, and unless another is wished for threshold in px of the image at hand, of tables and figures."""
 COLUMNS = ("experiment", "scene", "method", "mask", "threshold_px", "R", "pixels", *FIGURES, "quoted", "data")
 """The columns of ``comparison.csv``."""
 _TITLES = {
@@ -57,15 +57,20 @@ def _quoted(found: Comparison) -> list[Row]:
     return [row for row in QUOTED if row["experiment"] in run]
 
 
-def write_comparison(found: Comparison, folder: Path) -> list[Path]:
+def write_comparison(found: Comparison, folder: Path, threshold: float = THRESHOLD) -> list[Path]:
     """Write ``comparison.csv``, ``comparison.json`` and the figures; return their paths.
+
+    Args:
+        found: the comparison.
+        folder: where to.
+        threshold: of the figures, one of ``THRESHOLDS``, px; the other files have all.
 
     Raises:
         UsageError: if the folder cannot be written.
     """
     writable_folder(folder)
     written = [folder / "comparison.csv", folder / "comparison.json"]
-    for name, drawn in _figures(found).items():
+    for name, drawn in _figures(found, threshold).items():
         save_png(drawn, folder / name)
         written.append(folder / name)
     _write(written[0], _csv([*found.rows, *found.means, *_quoted(found)]))
@@ -86,22 +91,22 @@ def _csv(rows: Sequence[Row]) -> str:
     return text.getvalue()
 
 
-def _figures(found: Comparison) -> dict[str, Any]:
+def _figures(found: Comparison, threshold: float) -> dict[str, Any]:
     """Return the figures by file name: a figure an experiment that was run, and the sheets."""
-    rows = _at(found.rows)
+    rows = _at(found.rows, threshold)
     figures = {
         f"{experiment}.png": dots_figure(of(rows, experiment), figure, title=_TITLES[experiment])
         for experiment, figure in (("raw", "raw_bad"), ("auc", "auc"))
         if of(rows, experiment)
     }
     if of(rows, "density"):
-        figures["density.png"] = density_figure(_at(found.means))
+        figures["density.png"] = density_figure(_at(found.means, threshold))
     return figures | sheets(found)
 
 
-def _at(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows at the mask and threshold of tables and figures."""
-    return [row for row in rows if row["mask"] == MASK and row["threshold_px"] == THRESHOLD]
+def _at(rows: Iterable[Row], threshold: float) -> list[Row]:
+    """Return the rows at a threshold and the mask of tables and figures."""
+    return [row for row in rows if row["mask"] == MASK and row["threshold_px"] == threshold]
 
 
 def of(rows: Iterable[Row], experiment: str) -> list[Row]:
@@ -109,15 +114,16 @@ def of(rows: Iterable[Row], experiment: str) -> list[Row]:
     return [row for row in rows if row["experiment"] == experiment]
 
 
-def print_comparison(found: Comparison, masks: Iterable[str]) -> None:
+def print_comparison(found: Comparison, masks: Iterable[str], threshold: float = THRESHOLD) -> None:
     """Print a table an experiment, the paper's figures beside, and why something is missing.
 
     Args:
         found: the comparison.
         masks: where the non-occlusion masks of the scenes come from.
+        threshold: error above which a pixel is wrong, one of ``THRESHOLDS``, px.
     """
     console = results()
-    rows, means = _at(found.rows), _at(found.means)
+    rows, means = _at(found.rows, threshold), _at(found.means, threshold)
     for experiment, figure in (("raw", "raw_bad"), ("auc", "auc")):
         if of(rows, experiment):
             table = _by_scene(of(rows, experiment), of(means, experiment), experiment, figure)
@@ -127,7 +133,7 @@ def print_comparison(found: Comparison, masks: Iterable[str]) -> None:
     _print_quoted(console, _quoted(found))
     kinds = ", ".join(sorted(set(masks)))
     console.print()
-    text = f"mask: {MASK} ({kinds}); wrong: off by more than {THRESHOLD:g} px of the image at hand"
+    text = f"mask: {MASK} ({kinds}); wrong: off by more than {threshold:g} px of the image at hand"
     console.print(text, style="dim", highlight=False)
     for reason in dict.fromkeys(each["why"] for each in found.unavailable):
         methods = ", ".join(each["method"] for each in found.unavailable if each["why"] == reason)

@@ -31,10 +31,14 @@ def open_product(store: Store, key: str) -> "xr.Dataset":
 
 def _with_named_figures(dataset: "xr.Dataset") -> "xr.Dataset":
     """Return the product ``metrics`` with an array (mask, threshold) for each figure."""
-    from stages.metrics.stage import FIGURES, MASKS, by_name
+    from stages.metrics.stage import FIGURES, MASKS, THRESHOLDS, by_name
 
     named = {
         name: (("mask", "threshold"), values, {"units": FIGURES[name][1], "long_name": FIGURES[name][2]})
         for name, values in by_name(dataset["figures"].values).items()
     }
-    return dataset.drop_vars("figures").assign(named).assign_coords(mask=list(MASKS))
+    return (
+        dataset.drop_vars("figures")
+        .assign(named)
+        .assign_coords(mask=list(MASKS), threshold=("threshold", list(THRESHOLDS), {"units": "px"}))
+    )

@@ -55,12 +55,12 @@ def metric_rows(scene: str, method: str, R: float | None, arrays: Arrays) -> lis
     """
     named = by_name(arrays["figures"])
     return [
-        {"scene": scene, "method": method, "mask": mask, "threshold_px": float(threshold)}
+        {"scene": scene, "method": method, "mask": mask, "threshold_px": threshold}
         | ({} if R is None else {"R": R})
         | {"pixels": int(named["pixels"][m, t])}
         | {name: float(named[name][m, t]) for name in ROW if not np.isnan(named[name][m, t])}
         for m, mask in enumerate(MASKS)
-        for t, threshold in enumerate(arrays["threshold"])
+        for t, threshold in enumerate(THRESHOLDS)
     ]
 
 
@@ -92,7 +92,6 @@ def compute_metrics(_: NoParams, inputs: Inputs) -> Arrays:
         for row, mask in zip(raw, masks, strict=True)
     ]
     return {
-        "threshold": np.array(THRESHOLDS),
         "figures": np.array([[[cell[name] for cell in row] for row in table] for name in FIGURES], np.float64),
     }
 
@@ -140,15 +139,16 @@ def _filtered_figures(semidense: Array, truth: Array, mask: NDArray[np.bool_]) -
     return [same | {"bad": filtered.bad(threshold)} for threshold in THRESHOLDS]
 
 
+_AXES = f"{', '.join(MASKS)}; wrong above {', '.join(f'{threshold:g}' for threshold in THRESHOLDS)} px"
+
 METRICS = Stage(
     product="metrics",
     inputs=("semidense", "disparity", "confidence", "truth"),
     outputs=(
-        Output("threshold", ("threshold",), "float64", "px", "error above which a pixel is wrong"),
         # One array: as one each, the figures would take more time to store than to work out.
-        Output("figures", ("figure", "mask", "threshold"), "float64", "1", ", ".join(FIGURES)),
+        Output("figures", ("figure", "mask", "threshold"), "float64", "1", f"{', '.join(FIGURES)}; of {_AXES}"),
     ),
     compute="stages.metrics.stage:compute_metrics",
 )
-"""The figures of a scene, in the order of ``FIGURES``, masks in that of ``MASKS``. ``truth`` has ``disparity`` (y, x)
-float32, NaN unknown, and ``nonocc`` (y, x) bool. Not tiled: a quantile and a ranking are not sums over tiles."""
+"""The figures of a scene, in the order of ``FIGURES``, of ``MASKS`` and of ``THRESHOLDS``. ``truth`` has ``disparity``
+(y, x) float32, NaN unknown, and ``nonocc`` (y, x) bool. Not tiled: a quantile and a ranking are not sums over tiles."""

@@ -138,11 +138,25 @@ def test_the_tables_name_every_method(found: Comparison, capsys: pytest.CaptureF
         assert method in out, method
 
 
+def test_tables_are_of_the_threshold_that_was_wished_for(found: Comparison, capsys: pytest.CaptureFixture[str]) -> None:
+    raw = {
+        row["threshold_px"]: row["raw_bad"]
+        for row in found.means
+        if (row["experiment"], row["method"], row["mask"]) == ("raw", "dual-cnn, shipped weights", "nonocc")
+    }
+    assert raw[0.5] != raw[4.0]
+    for threshold in (0.5, 4.0):
+        print_comparison(found, ["exact"], threshold)
+        out = capsys.readouterr().out
+        assert f"off by more than {threshold:g} px" in out and f"{raw[threshold]:.2f}" in out
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         pytest.param(["--experiment", "row"], "did you mean raw", id="an experiment that does not exist"),
         pytest.param(["--train-on", TEST_ONLY], "no training scene", id="nothing to train on"),
+        pytest.param(["--threshold", "3"], "--threshold 3: figures are worked out for 0.5, 1, 2, 4 px", id="threshold"),
         pytest.param(["--set", "sgm.windo=3"], "did you mean sgm.window", id="a setting that does not exist"),
     ],
 )
