@@ -150,13 +150,13 @@ def _draw(matchers: dict[str, dict[str, float]], rows: int, path: Path) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(6, 3.6), layout="constrained")
+    figure, axes = plt.subplots(figsize=(7.5, 3.6), layout="constrained")
     for name, found in matchers.items():
         axes.scatter(found["seconds"], found["raw_bad"], label=name)
     axes.set(xscale="log", xlabel="seconds", ylabel="raw error > 1 px, %", title=f"Motorcycle, {rows} rows")
     axes.set_ylim(bottom=0)
     axes.grid(alpha=0.3, which="both")
-    axes.legend()
+    figure.legend(loc="outside right upper")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=120)
     plt.close(figure)
