@@ -1,10 +1,10 @@
-"""Arrays from elsewhere: of the form that ``Draft`` writes, and of bounded size, before anything decodes them."""
+"""The files of arrays; and of arrays from elsewhere, that they are as ``Draft`` writes them, before any is decoded."""
 
 import json
 import math
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -53,6 +53,16 @@ def check_arrays(folder: Path, manifest: Manifest, largest: int) -> None:
         raise ValueError(f"{min(paths ^ expected)} is {'missing' if min(paths ^ expected) in expected else 'no chunk'}")
 
 
+def chunk_paths(shape: Sequence[int], chunks: Sequence[int]) -> Iterator[str]:
+    """Yield the path of every chunk of an array of some shape and chunk shape, relative to the array's folder."""
+    return ("/".join(("c", *map(str, place))) for place in product(*map(range, _counts(shape, chunks))))
+
+
+def _counts(shape: Sequence[int], chunks: Sequence[int]) -> list[int]:
+    """Return how many chunks there are along each dimension."""
+    return [-(-length // chunk) for length, chunk in zip(shape, chunks, strict=True)]
+
+
 def _metadata(path: Path) -> dict[str, Any]:
     if path.stat().st_size > _LARGEST_METADATA:
         raise ValueError(f"{path.name} has more than {_LARGEST_METADATA:,} bytes")
@@ -67,12 +77,12 @@ def _check_array(folder: Path, name: str, paths: set[str], expected: set[str]) -
     if chunk_size > LARGEST_CHUNK:
         sides = " x ".join(map(str, chunks))
         raise ValueError(f"a chunk of {name} would be {sides} x {item} = {chunk_size:,} bytes, above {LARGEST_CHUNK:,}")
-    counts = [-(-length // chunk) for length, chunk in zip(shape, chunks, strict=True)]
-    if math.prod(counts) > len(paths):
-        raise ValueError(f"{name} would have {math.prod(counts):,} chunks, the entry has {len(paths):,} files")
+    count = math.prod(_counts(shape, chunks))
+    if count > len(paths):
+        raise ValueError(f"{name} would have {count:,} chunks, the entry has {len(paths):,} files")
     expected.add(f"{DATA}/{name}/zarr.json")
-    for place in product(*map(range, counts)):
-        path = "/".join((DATA, name, "c", *map(str, place)))
+    for chunk in chunk_paths(shape, chunks):
+        path = f"{DATA}/{name}/{chunk}"
         expected.add(path)
         if path in paths and (found := _decoded_size(folder / path)) != chunk_size:
             raise ValueError(f"{path} would decode to {found} bytes, its array says {chunk_size:,}")

@@ -64,12 +64,21 @@ def canonical(value: object) -> str:
     Raises:
         InvalidRecipe: as ``plain`` does.
     """
-    return json.dumps(plain(value), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return _spelled(plain(value))
+
+
+def _spelled(value: Json) -> str:
+    """As ``canonical``, of what is plain already."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def digest(value: object) -> str:
     """Return the sha256 of the canonical JSON of ``value``, in hexadecimal."""
-    return hashlib.sha256(canonical(value).encode("ascii")).hexdigest()
+    return _hash(canonical(value))
+
+
+def _hash(text: str) -> str:
+    return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
 def parse(text: str) -> dict[str, Any]:
@@ -104,7 +113,7 @@ def _refuse_constant(name: str) -> NoReturn:
 def seal(kind: str, content: Mapping[str, Any]) -> bytes:
     """Return the file of a document: its content, kind, format and checksum, readable."""
     body = {**plain_mapping(kind, content), "kind": kind, "format": FORMAT_VERSION}
-    sealed = {**body, "checksum": digest(body)}
+    sealed = {**body, "checksum": _hash(_spelled(body))}
     return (json.dumps(sealed, sort_keys=True, indent=1, allow_nan=False) + "\n").encode("ascii")
 
 

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from itertools import product
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from cache import publish
+from cache.arrays import chunk_paths
 from cache.document import canonical, parse
 from cache.entry import DATA, Entry
 from cache.errors import IncompleteDraft, InvalidArray
@@ -203,14 +203,18 @@ class Draft:
         with writing(self.path):
             yield
 
-    def _sizes(self) -> dict[str, dict[str, int]]:
-        """Return the length of each dimension of each array that is there.
+    def _metadata(self) -> dict[str, dict[str, Any]]:
+        """Return what zarr wrote of each array that is there.
 
-        Read from the files: zarr would open every array, and a product of many small ones would wait for that most.
+        Read from the files: zarr would open every array, and a product of small ones would wait for that most.
         """
-        found = {path.parent.name: json.loads(path.read_bytes()) for path in (self.path / DATA).glob("*/zarr.json")}
+        return {path.parent.name: json.loads(path.read_bytes()) for path in (self.path / DATA).glob("*/zarr.json")}
+
+    def _sizes(self) -> dict[str, dict[str, int]]:
+        """Return the length of each dimension of each array that is there."""
         return {
-            name: dict(zip(each.get("dimension_names", ()), each["shape"], strict=True)) for name, each in found.items()
+            name: dict(zip(each.get("dimension_names", ()), each["shape"], strict=True))
+            for name, each in self._metadata().items()
         }
 
     def _group(self) -> "zarr.Group":
@@ -230,12 +234,13 @@ class Draft:
 
     def _complete(self) -> list[str]:
         """Return the path of every file of the draft, once each is known to be there."""
-        arrays = dict(self._group().arrays())
+        arrays = self._metadata()
         if not arrays:
             raise IncompleteDraft(f"the draft of {self.recipe.stage} has no array: create and write one")
         paths = [f"{DATA}/zarr.json"]
-        for name, array in arrays.items():
-            paths += [f"{DATA}/{name}/zarr.json", *(f"{DATA}/{name}/{chunk}" for chunk in _chunk_keys(array))]
+        for name, about in arrays.items():
+            chunks = chunk_paths(about["shape"], about["chunk_grid"]["configuration"]["chunk_shape"])
+            paths += [f"{DATA}/{name}/{path}" for path in ("zarr.json", *chunks)]
         missing = [path for path in paths if not (self.path / path).is_file()]
         if missing:
             raise IncompleteDraft(
@@ -256,12 +261,6 @@ def _require_dtype(name: str, dtype: str) -> "np.dtype[Any]":
     if kind.kind not in "biuf" or not kind.isnative or kind.itemsize > 8:
         raise InvalidArray(f"array {name!r}: {dtype!r} cannot be stored: use bool, an integer or a float type")
     return kind
-
-
-def _chunk_keys(array: "zarr.Array[Any]") -> Iterator[str]:
-    """Yield the path of every chunk of an array, relative to it."""
-    counts = (-(-size // chunk) for size, chunk in zip(array.shape, array.chunks, strict=True))
-    return (array.metadata.encode_chunk_key(place) for place in product(*map(range, counts)))
 
 
 def _require_aligned(where: str, array: "zarr.Array[Any]", region: tuple[slice, ...]) -> list[tuple[int, int]]:

@@ -157,7 +157,8 @@ def _by_scene(rows: Sequence[Row], means: Sequence[Row], experiment: str, figure
 
 def _density_table(means: Sequence[Row]) -> Table:
     """Return a table of what semi-dense maps report: means over the scenes."""
-    title = f"Semi-dense maps, {means[0]['scene']} scenes; errors of reported pixels, px"
+    plural = "" if means[0]["scene"] == "mean of 1" else "s"
+    title = f"Semi-dense maps, {means[0]['scene']} scene{plural}; errors of reported pixels, px"
     table = _table(title, "method", "R", *(_SHORT.get(name, name) for name in _DENSITY))
     for row in means:
         threshold = f"{row['R']:g}" if "R" in row else "-"
