@@ -1,4 +1,7 @@
-"""Two workers against one, the same plan: ``python -m benchmarks.workers``. Every product of a scene is made again."""
+"""Two workers against one, the same plan: ``python -m benchmarks.workers``. Every product of a scene is made again.
+
+The scene is as high as a quarter-size one, so that each stage has tiles for both.
+"""
 
 import tempfile
 from pathlib import Path
@@ -14,9 +17,9 @@ MADE = ("images", "truth", *(stage.product for stage in CATALOG if stage.scope =
 
 
 def main(
-    rows: Annotated[int, typer.Option()] = 256,
-    columns: Annotated[int, typer.Option()] = 320,
-    disparities: Annotated[int, typer.Option()] = 24,
+    rows: Annotated[int, typer.Option()] = 512,
+    columns: Annotated[int, typer.Option()] = 192,
+    disparities: Annotated[int, typer.Option()] = 20,
     pairs: Annotated[int, typer.Option()] = PAIRS,
 ) -> None:
     """Compare whole runs, networks excepted."""
