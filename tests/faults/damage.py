@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
 
 from cache import Store
@@ -51,6 +52,11 @@ def chunk(folder: Path, number: int = 0) -> Path:
     return chunks[min(number, len(chunks) - 1)]
 
 
+def _aside(path: Path) -> Path:
+    """Return this path with a number behind it at which nothing is yet: the same damage may strike twice."""
+    return next(each for number in count() if not os.path.lexists(each := path.with_name(f"{path.name}-{number}")))
+
+
 def _array(folder: Path) -> Path:
     return next(path.parent for path in sorted(folder.glob("data.zarr/*/zarr.json")))
 
@@ -65,22 +71,21 @@ def _swap(folder: Path, _: Path) -> None:
 
 
 def _link(folder: Path, _: Path) -> None:
-    path = chunk(folder)
-    shutil.copy(path, folder.parent / "copy")
+    path, copy = chunk(folder), _aside(folder.parent / "copy")
+    shutil.copy(path, copy)
     path.unlink()
-    path.symlink_to(folder.parent / "copy")
+    path.symlink_to(copy)
 
 
 def _link_folder(folder: Path, _: Path) -> None:
-    array = _array(folder)
-    shutil.copytree(array, folder.parent / "copied")
+    array, copy = _array(folder), _aside(folder.parent / "copied")
+    shutil.copytree(array, copy)
     shutil.rmtree(array)
-    array.symlink_to(folder.parent / "copied")
+    array.symlink_to(copy)
 
 
 def _link_entry(folder: Path, _: Path) -> None:
-    folder.rename(folder.with_name("moved"))
-    folder.symlink_to(folder.with_name("moved"))
+    folder.symlink_to(folder.rename(_aside(folder.with_name("moved"))))
 
 
 def _pipe(folder: Path, _: Path) -> None:
@@ -122,7 +127,7 @@ DAMAGE: dict[str, Damage] = {
     "no manifest": lambda f, r: (f / "manifest.json").unlink(),
     "empty manifest": lambda f, r: overwrite(f / "manifest.json", b""),
     "manifest and files edited alike": _manifest_with_its_own_checksum,
-    "no entry": lambda f, r: f.rename(f.with_name("gone")),
+    "no entry": lambda f, r: f.rename(_aside(f.with_name("gone"))),
     "truncated record": lambda f, r: overwrite(r, r.read_bytes()[:-1]),
     "empty record": lambda f, r: overwrite(r, b""),
     "zeroed record": lambda f, r: overwrite(r, bytes(len(r.read_bytes()))),
@@ -130,7 +135,7 @@ DAMAGE: dict[str, Damage] = {
     "edited time": lambda f, r: _edited(r, b'"created": "2', b'"created": "3'),
     "newer format": lambda f, r: _edited(r, b'mat": 1', b'mat": 2'),
     "older format": lambda f, r: _edited(r, b'mat": 1', b'mat": 0'),
-    "record is a link": lambda f, r: (r.rename(f.parent / "r"), r.symlink_to(f.parent / "r")),
+    "record is a link": lambda f, r: r.symlink_to(r.rename(_aside(f.parent / "r"))),
     "record is a folder": lambda f, r: (r.unlink(), r.mkdir()),
     "record is a pipe": lambda f, r: (r.unlink(), os.mkfifo(r)),
 }

@@ -5,7 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from cache import Store
+from tests.faults import world
 from tests.faults.__main__ import MARKS, QUOTES
+from tests.faults.damage import DAMAGE, SAME_SIZE, unlock
 from tests.faults.matrix import PROMISED, ROWS, Row, markdown, run_row, summary, total
 
 PROJECT = Path(__file__).parents[2]
@@ -41,3 +44,15 @@ def test_the_large_form_is_as_large_as_promised_and_clean() -> None:
     assert [count for name, count in found["total"].items() if name != "injected"] == [0, 0, 0, 0]
     assert str(f"{found['total']['injected']:,}") in markdown(found["rows"])
     assert summary(found["rows"]).count("\n") == 0
+
+
+@pytest.mark.parametrize("name", [*DAMAGE, *SAME_SIZE])
+def test_the_same_damage_can_strike_twice(name: str) -> None:
+    with world.folder() as root:
+        store = Store(root)
+        for _ in range(2):
+            made = world.run(store, world.small(0))
+            key = min(each.key for each in made.values())
+            unlock(store, key)
+            {**DAMAGE, **SAME_SIZE}[name](store.layout.entry(key), store.layout.record(key))
+            assert store.check(key) is not None
