@@ -38,7 +38,7 @@ def test_a_run_makes_every_product_of_every_scene(trained: Result) -> None:
     "product", sorted({name for name in PATH if name in STAGES and STAGES[name].scope == "scene"} - {"right_disparity"})
 )
 def test_every_array_is_as_declared(trained: Result, product: str) -> None:
-    dataset = trained.open(product, "test-0")
+    dataset = trained.store.open(trained.find(product, "test-0").key)
     for output in STAGES[product].outputs:
         array = dataset[output.name]
         assert array.dims == output.dims
