@@ -18,7 +18,7 @@ from stages.allocator import keep_freed_memory
 from stages.matching.declaration import RADIUS, CostVolumeParams
 from stages.matching.guided import padded_guided_costs
 from stages.matching.net import SIDES, MatchingNet, net_from_parameters, require_views
-from stages.matching.transformed import TransformedNet, is_transformable, run_block
+from stages.matching.transformed import TransformedNet, is_transformable, run_blocks
 from stages.matching.winograd import TILE
 from stages.precision import Precision, autocast
 from stages.stage import Inputs, require_shape
@@ -122,8 +122,8 @@ def _transformed(net: MatchingNet, views: Tensor) -> Costs:
     def costs(y: int, x: int, columns: int, disparity: int) -> NDArray[np.float32]:
         rows = min(ROWS, height - y)
         shape = -(-rows // TILE), -(-columns // TILE)
-        block = run_block(transformed, left, right, (y, x, x - disparity), shape)
-        made: NDArray[np.float32] = net.odds_of_features(block.units)[:rows, :columns].numpy()
+        units = run_blocks(transformed, left, right, [(y, x, x - disparity)], shape).units[0]
+        made: NDArray[np.float32] = net.odds_of_features(units)[:rows, :columns].numpy()
         return made
 
     return costs

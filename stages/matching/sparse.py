@@ -107,7 +107,7 @@ def _quarters(places: Places) -> tuple[Places, NDArray[np.int64]]:
 def _run(
     net: TransformedNet, left: Tensor, right: Tensor, corners: NDArray[np.int64], slots: NDArray[np.int64]
 ) -> Tensor:
-    """Return the units of the hidden layer, (4, 4 n, UNITS): as ``transformed.run_block``, for tiles anywhere."""
+    """Return the units of the hidden layer, (4, 4 n, UNITS): as ``transformed.run_blocks``, for tiles anywhere."""
     count, tiles = len(corners), len(slots)
     joined = torch.empty(count, 36, JOINED)
     products = torch.zeros(36, count, FEATURES)

@@ -14,6 +14,7 @@ batched matrix products write fastest. The channels of a number are side by side
 constant in each kernel: only then does the compiler know that no index is negative, and make vector instructions.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,15 +54,15 @@ ZERO = np.float32(0)
 
 Shape = tuple[int, int]
 """Rows and columns of tiles."""
+Corners = tuple[int, int, int]
+"""First row of a block, and its first column in the left and in the right view."""
 
 
 @kernel
-def join(
-    left: NDArray[np.float32], right: NDArray[np.float32], corners: tuple[int, int, int], shape: Shape, tiles: Flat
-) -> None:
+def join(left: NDArray[np.float32], right: NDArray[np.float32], corners: Corners, shape: Shape, tiles: Flat) -> None:
     """Add two views of one channel (y, x, JOINED), cut at zero, and transform 6 x 6 tiles that lie 4 px apart.
 
-    ``corners``: first row, first column in the left and in the right view. ``tiles``: (tile, 36, JOINED).
+    ``tiles``: (tile, 36, JOINED).
     """
     row = 6 * JOINED
     part = np.empty(6 * 6 * JOINED, np.float32)  # one tile, transformed along its rows: fits the first-level cache
@@ -190,39 +191,41 @@ class TransformedNet:
 
 
 @dataclass(frozen=True)
-class Block:
-    """The maps of a block of cells at one disparity that a gradient needs again."""
+class Blocks:
+    """The maps of blocks of cells that a gradient needs again."""
 
-    features: Tensor  # 4 y + 4, 4 x + 4, FEATURES
-    split: Tensor  # tile 64 FEATURES
-    units: Tensor  # 4 y, 4 x, UNITS
+    features: Tensor  # block 4 y + 4, 4 x + 4, FEATURES
+    split: Tensor  # block tile 64 FEATURES
+    units: Tensor  # block 4 y, 4 x, UNITS
 
 
-def run_block(net: TransformedNet, left: Tensor, right: Tensor, corners: tuple[int, int, int], shape: Shape) -> Block:
-    """Run a block of cells at one disparity.
+def run_blocks(net: TransformedNet, left: Tensor, right: Tensor, corners: Sequence[Corners], shape: Shape) -> Blocks:
+    """Run blocks of cells, each at one disparity; small ones together, since large products are quicker.
 
     Args:
         net: the transformed kernels.
         left: (l, y, x, JOINED) float32, contiguous: the embedded left view.
         right: likewise the right view.
-        corners: the block's first row, first column in ``left`` and in ``right``; 6 rows and columns more than
-            it has cells are read from there.
-        shape: rows and columns of the block, in tiles of 4 x 4 cells.
+        corners: of each block; 6 rows and columns more than it has cells are read from there.
+        shape: rows and columns of a block, in tiles of 4 x 4 cells.
     """
     wide = shape[0] + 1, shape[1] + 1  # the hidden layer reaches 4 px on
-    joined = torch.empty(wide[0] * wide[1], 36, JOINED)
-    products = torch.zeros(36, wide[0] * wide[1], FEATURES)
+    count = len(corners)
+    joined = torch.empty(count, wide[0] * wide[1], 36, JOINED)
+    products = torch.zeros(36, count * wide[0] * wide[1], FEATURES)
     for one, other, weight in zip(left, right, net.conv3, strict=True):
-        join(one.numpy(), other.numpy(), corners, wide, flat(joined))
-        products.baddbmm_(joined.transpose(0, 1), weight)
-    maps = torch.empty(TILE * wide[0], TILE * wide[1], FEATURES)
-    features(products.numpy(), net.conv3_bias.numpy(), wide, flat(maps))
-    tiles = torch.empty(shape[0] * shape[1], 64, FEATURES)
-    split(flat(maps), shape, flat(tiles))
-    answers = torch.bmm(tiles.transpose(0, 1), net.hidden)
-    made = torch.empty(TILE * shape[0], TILE * shape[1], UNITS)
-    units(answers.numpy(), net.hidden_bias.numpy(), shape, flat(made))
-    return Block(maps, tiles, made)
+        for at, block in zip(corners, joined, strict=True):
+            join(one.numpy(), other.numpy(), at, wide, flat(block))
+        products.baddbmm_(joined.flatten(0, 1).transpose(0, 1), weight)
+    maps = torch.empty(count, TILE * wide[0], TILE * wide[1], FEATURES)
+    features(products.numpy(), net.conv3_bias.numpy(), (count * wide[0], wide[1]), flat(maps))
+    tiles = torch.empty(count, shape[0] * shape[1], 64, FEATURES)
+    for block, one in zip(maps, tiles, strict=True):
+        split(flat(block), shape, flat(one))
+    answers = torch.bmm(tiles.flatten(0, 1).transpose(0, 1), net.hidden)
+    made = torch.empty(count, TILE * shape[0], TILE * shape[1], UNITS)
+    units(answers.numpy(), net.hidden_bias.numpy(), (count * shape[0], shape[1]), flat(made))
+    return Blocks(maps, tiles, made)
 
 
 def flat(tensor: Tensor) -> Flat:

@@ -19,14 +19,14 @@ from stages.matching.transformed import (
     JOINED,
     UNITS,
     ZERO,
-    Block,
+    Blocks,
     Shape,
     TransformedNet,
     eight_pixels,
     flat,
     four_pixels,
     join,
-    run_block,
+    run_blocks,
 )
 from stages.matching.winograd import (
     TILE,
@@ -45,6 +45,9 @@ from stages.matching.winograd import (
     store6,
     store8,
 )
+
+TOGETHER = 192
+"""Tiles of a crop's slots whose products are made at once: what is in between still stays in the processor's cache."""
 
 
 @kernel
@@ -161,19 +164,22 @@ class _JoinedUnits(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, left: Tensor, strip: Tensor, starts: Sequence[int], *kernels: Tensor) -> Tensor:  # noqa: ANN401
         net, shape = TransformedNet(*kernels), _tiles(left)
-        blocks = [run_block(net, left, strip, (0, 0, start), shape) for start in starts]
-        ctx.views, ctx.starts, ctx.net, ctx.blocks = (left, strip), starts, net, blocks
-        return torch.stack([block.units for block in blocks])
+        several = max(1, TOGETHER // (shape[0] * shape[1]))
+        groups = [starts[first : first + several] for first in range(0, len(starts), several)]
+        made = [run_blocks(net, left, strip, [(0, 0, start) for start in group], shape) for group in groups]
+        ctx.views, ctx.net, ctx.groups, ctx.made = (left, strip), net, groups, made
+        return torch.cat([blocks.units for blocks in made])
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, ...]:  # noqa: ANN401
         views, net = ctx.views, ctx.net
         totals = tuple(torch.zeros_like(view) for view in views)
         kernels = [torch.zeros_like(part) for part in (net.conv3, net.conv3_bias, net.hidden, net.hidden_bias)]
-        for start, block, given in zip(ctx.starts, ctx.blocks, gradient, strict=True):
-            products = _products_gradient(net, block, given, kernels)
-            _views_gradient(net, views, start, products, totals, kernels[0])
-        ctx.blocks = None
+        given = torch.split(gradient, [len(group) for group in ctx.groups])
+        for group, blocks, part in zip(ctx.groups, ctx.made, given, strict=True):
+            products = _products_gradient(net, blocks, part, kernels)
+            _views_gradient(net, views, group, products, totals, kernels[0])
+        ctx.made = None
         return (*totals, None, *kernels)
 
 
@@ -181,30 +187,31 @@ def _tiles(left: Tensor) -> Shape:
     return (left.shape[1] - 6) // TILE, (left.shape[2] - 6) // TILE
 
 
-def _products_gradient(net: TransformedNet, block: Block, given: Tensor, kernels: Sequence[Tensor]) -> Tensor:
+def _products_gradient(net: TransformedNet, blocks: Blocks, given: Tensor, kernels: Sequence[Tensor]) -> Tensor:
     """Return the gradient of conv3's products from that of the units; add up those of the kernels on the way."""
     _, conv3_bias, hidden, hidden_bias = kernels
-    shape = given.shape[0] // TILE, given.shape[1] // TILE
-    cut = given * (block.units > 0)
-    hidden_bias += cut.sum((0, 1))
-    answers = torch.empty(shape[0] * shape[1], 64, UNITS)
-    _units_transposed(flat(cut), shape, flat(answers))
-    hidden.baddbmm_(block.split.permute(1, 2, 0), answers.transpose(0, 1))
+    count, shape = len(given), (given.shape[1] // TILE, given.shape[2] // TILE)
+    cut = given * (blocks.units > 0)
+    hidden_bias += cut.sum((0, 1, 2))
+    answers = torch.empty(count * shape[0] * shape[1], 64, UNITS)
+    _units_transposed(flat(cut), (count * shape[0], shape[1]), flat(answers))
+    hidden.baddbmm_(blocks.split.flatten(0, 1).permute(1, 2, 0), answers.transpose(0, 1))
     tiles = torch.bmm(answers.transpose(0, 1), net.hidden.transpose(1, 2))
-    maps = torch.zeros_like(block.features)
-    _split_transposed(tiles.numpy(), shape, flat(maps))
-    maps *= block.features > 0
-    conv3_bias += maps.sum((0, 1))
+    maps = torch.zeros_like(blocks.features)
+    for block, one in zip(maps, tiles.chunk(count, 1), strict=True):
+        _split_transposed(one.numpy(), shape, flat(block))
+    maps *= blocks.features > 0
+    conv3_bias += maps.sum((0, 1, 2))
     wide = shape[0] + 1, shape[1] + 1
-    products = torch.empty(wide[0] * wide[1], 36, FEATURES)
-    _features_transposed(flat(maps), wide, flat(products))
+    products = torch.empty(count * wide[0] * wide[1], 36, FEATURES)
+    _features_transposed(flat(maps), (count * wide[0], wide[1]), flat(products))
     return products
 
 
 def _views_gradient(
     net: TransformedNet,
     views: tuple[Tensor, Tensor],
-    start: int,
+    starts: Sequence[int],
     products: Tensor,
     totals: tuple[Tensor, ...],
     conv3: Tensor,
@@ -212,11 +219,13 @@ def _views_gradient(
     """Add up the gradients of the views and of conv3's kernels from that of its products."""
     rows, columns = _tiles(views[0])
     wide = rows + 1, columns + 1
-    tiles = torch.empty(wide[0] * wide[1], 36, JOINED)
+    tiles = torch.empty(len(starts), wide[0] * wide[1], 36, JOINED)
     for layer, weight in enumerate(net.conv3):
         one, other = (view[layer].numpy() for view in views)
-        join(one, other, (0, 0, start), wide, flat(tiles))
-        conv3[layer].baddbmm_(tiles.permute(1, 2, 0), products.transpose(0, 1))
+        for start, block in zip(starts, tiles, strict=True):
+            join(one, other, (0, 0, start), wide, flat(block))
+        conv3[layer].baddbmm_(tiles.flatten(0, 1).permute(1, 2, 0), products.transpose(0, 1))
         given = torch.bmm(products.transpose(0, 1), weight.transpose(1, 2))
         gradients = totals[0][layer].numpy(), totals[1][layer].numpy()
-        _join_transposed(given.numpy(), (one, other), start, wide, gradients)
+        for start, part in zip(starts, given.chunk(len(starts), 1), strict=True):
+            _join_transposed(part.numpy(), (one, other), start, wide, gradients)

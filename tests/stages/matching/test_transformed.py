@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from stages.matching.net import SIDES
-from stages.matching.transformed import TransformedNet, is_transformable, run_block
+from stages.matching.transformed import TransformedNet, is_transformable, run_blocks
 from stages.matching.winograd import TILE
 from tests.stages.matching.reference import random_net
 
@@ -11,30 +11,34 @@ from tests.stages.matching.reference import random_net
 @pytest.mark.parametrize(
     ("channels", "tiles", "corners"),
     [
-        pytest.param(1, (1, 1), (0, 0, 0), id="one tile, one channel"),
-        pytest.param(3, (2, 3), (0, 0, 0), id="from the corner"),
-        pytest.param(3, (1, 2), (3, 5, 2), id="from elsewhere, shifted to the left"),
-        pytest.param(2, (2, 1), (1, 0, 6), id="shifted to the right"),
+        pytest.param(1, (1, 1), [(0, 0, 0)], id="one tile, one channel"),
+        pytest.param(3, (2, 3), [(0, 0, 0)], id="from the corner"),
+        pytest.param(3, (1, 2), [(3, 5, 2)], id="from elsewhere, shifted to the left"),
+        pytest.param(2, (2, 1), [(1, 0, 6)], id="shifted to the right"),
+        pytest.param(3, (2, 3), [(1, 0, 6), (0, 0, 0), (3, 5, 2)], id="three blocks at once"),
     ],
 )
-def test_equals_the_direct_convolutions(channels: int, tiles: tuple[int, int], corners: tuple[int, int, int]) -> None:
+def test_equals_the_direct_convolutions(
+    channels: int, tiles: tuple[int, int], corners: list[tuple[int, int, int]]
+) -> None:
     """Against the network itself in float64; the direct way in float32 errs too."""
     net = random_net(channels)
     views = torch.from_numpy(np.random.default_rng(1).normal(size=(2, channels, 26, 32)).astype(np.float32))
     with torch.inference_mode():
         maps = [net.embed_layers(view[None], side) for view, side in zip(views, SIDES, strict=True)]
         left, right = (each.permute(0, 2, 3, 1).contiguous() for each in maps)
-        block = run_block(TransformedNet.of(net), left, right, corners, tiles)
-        made = net.odds_of_features(block.units)
+        made = net.odds_of_features(run_blocks(TransformedNet.of(net), left, right, corners, tiles).units)
         rows, columns = (TILE * count + 6 for count in tiles)
-        y, *starts = corners
-        one, other = (
-            each.reshape(1, -1, *each.shape[2:])[..., y : y + rows, x : x + columns]
-            for each, x in zip(maps, starts, strict=True)
-        )
-        expected = net.double().join(one.double(), other.double())[0]
-    assert made.shape == (TILE * tiles[0], TILE * tiles[1]) and made.dtype == torch.float32
-    assert (made - (expected[1] - expected[0])).abs().max() <= 1e-4
+        expected = []
+        for y, *starts in corners:
+            one, other = (
+                each.double().reshape(1, -1, *each.shape[2:])[..., y : y + rows, x : x + columns]
+                for each, x in zip(maps, starts, strict=True)
+            )
+            logits = random_net(channels).double().join(one, other)[0]
+            expected.append(logits[1] - logits[0])
+    assert made.shape == (len(corners), TILE * tiles[0], TILE * tiles[1]) and made.dtype == torch.float32
+    assert (made - torch.stack(expected)).abs().max() <= 1e-4
 
 
 def test_only_the_compact_head_in_float32_is_transformed() -> None:
