@@ -33,6 +33,14 @@ def compare(
             "--train-on", help="Train on this dataset what must be trained: O1, CCNN, networks of fewer channels."
         ),
     ] = None,
+    protocol: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--protocol",
+            help="Also train and test by the paper's own protocols: same (pairs) or folds (over them, with those of "
+            "--train-on); may be repeated.",
+        ),
+    ] = None,
     threshold: Annotated[
         float, typer.Option("--threshold", help="Error in px above which tables and figures call a pixel wrong.")
     ] = 1.0,
@@ -61,7 +69,9 @@ def compare(
     task = api.Task(dataset, tuple(scene or ()), tuple(settings or ()), config, False, cache)
     experiments = experiment or comparison.EXPERIMENTS
     with ProgressWatch() as watch:
-        found = comparison.compare(task, experiments, train_on, watch=watch, scheduler=scheduler, workers=workers)
+        found = comparison.compare(
+            task, experiments, train_on, protocol or (), watch=watch, scheduler=scheduler, workers=workers
+        )
     files = comparison_report.write_comparison(found, output, threshold)
     if as_json:
         console.print_json(comparison_report.as_json(found, files))

@@ -27,6 +27,7 @@ from pipeline.comparison_rows import (
 from pipeline.config import Config, nearest
 from pipeline.environment import missing_packages
 from pipeline.errors import UsageError
+from pipeline.protocols import PROTOCOLS, protocol_requests, require_protocols
 from pipeline.quoted import NAMED
 from pipeline.steps import Request
 from pipeline.tasks import Made, Watch, read_arrays
@@ -60,6 +61,7 @@ ABLATION = {
 }
 """matching-Nets that see different channels; the last is what MC-CNN sees."""
 _ALWAYS = ("images", "truth", "disparity", "confidence")
+_SHIPPED = ", shipped weights"
 _UNTRAINED = "needs a training set: name one with --train-on"
 
 
@@ -107,6 +109,7 @@ def compare(
     task: Task | str = "motorcycle",
     experiments: Sequence[str] = EXPERIMENTS,
     train_on: str | None = None,
+    protocols: Sequence[str] = (),
     *,
     watch: Watch | None = None,
     scheduler: str | None = None,
@@ -119,6 +122,7 @@ def compare(
         experiments: of ``EXPERIMENTS``.
         train_on: dataset whose training scenes O1 and CCNN learn from, and on which matching-Nets with different
             channels are trained from nothing, alike; without it, those rows are left out.
+        protocols: of ``PROTOCOLS``: the paper's own, by which both networks are trained and tested beside ours.
         watch: as for ``run``.
         scheduler: as for ``run``.
         workers: as for ``run``.
@@ -128,16 +132,21 @@ def compare(
     """
     task = Task(task) if isinstance(task, str) else task
     _require(task, experiments)
+    require_protocols(protocols)
     training = training_scenes(open_dataset(train_on)) if train_on else ()
     plain = task.request("semidense")
     dataset, notes = _with_truth(plain.dataset)
     products, unavailable = _available(experiments, bool(training))
     request = dataclasses.replace(plain, dataset=dataset, training=training, also=(*_ALWAYS, *products))
+    lenient = [(name, each) for name in protocols for each in protocol_requests(name, task, dataset, training)]
     result = carry_out(task, request, (), watch, scheduler, workers)
     rows = list(_rows(result, experiments))
     if "raw" in experiments and training:
         ablation = _ablation_request(task, dataset, training)
         rows += _ablation_rows(carry_out(task, ablation, (), watch, scheduler, workers))
+    for protocol, wanted in lenient:
+        trained = carry_out(task, wanted, (), watch, scheduler, workers)
+        rows += _named(_rows(trained, experiments), PROTOCOLS[protocol])
     return Comparison(rows, unavailable, (*notes, *result.plan.notes), result)
 
 
@@ -206,8 +215,15 @@ def _rows(result: Result, experiments: Sequence[str]) -> Iterator[Row]:
             yield from _EXPERIMENT[experiment](judged, products, made["semidense"].step.R)
 
 
+def _named(rows: Iterable[Row], protocol: str) -> Iterator[Row]:
+    """Yield the rows of networks that were trained by a protocol, under its name; the curve stays ours alone."""
+    for row in rows:
+        if row["experiment"] != "curve":
+            yield row | {"method": f"{row['method'].removesuffix(_SHIPPED)}, {protocol}"}
+
+
 def _raw(judged: Judged, products: Mapping[str, Arrays], _: float | None) -> Iterator[Row]:
-    yield from raw_rows(judged, f"{OURS}, shipped weights", products["disparity"]["disparity"])
+    yield from raw_rows(judged, f"{OURS}{_SHIPPED}", products["disparity"]["disparity"])
     for method, product in MATCHERS.items():
         if product in products:
             yield from raw_rows(judged, method, products[product]["dense"])

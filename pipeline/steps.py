@@ -6,7 +6,7 @@ share the steps in which they agree, so a sweep computes nothing twice. Nothing 
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -125,6 +125,7 @@ class Request:
         training: the scenes to train on; needed with ``train``, and for products that are always learnt.
         notes: what a person should know of it.
         also: further products of each scene that has a truth, beside ``upto``.
+        leave_out: leave out scenes that are trained on.
     """
 
     dataset: Dataset
@@ -134,6 +135,7 @@ class Request:
     training: tuple[SceneSource, ...] = ()
     notes: tuple[str, ...] = ()
     also: tuple[str, ...] = ()
+    leave_out: bool = True
 
     def __post_init__(self) -> None:
         """Refuse a product that does not exist."""
@@ -149,7 +151,7 @@ def build(request: Request) -> Graph:
         StageError: if shipped weights are needed and there are none.
     """
     graph = Graph(notes=list(request.notes))
-    trained_on = {_identity(scene) for scene in request.training}
+    trained_on = [scene.image_identity() for scene in request.training if request.leave_out]
     for variant, config in request.configs.items():
         if request.train:
             require_trainable(config)
@@ -163,14 +165,14 @@ def build(request: Request) -> Graph:
     return graph
 
 
-def _targets(builder: "_Builder", trained_on: set[str]) -> Iterator[str]:
-    """Add what one configuration asks for; yield the ids of its last steps."""
+def _targets(builder: "_Builder", trained_on: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Add what one configuration asks for, but for the pairs that are trained on; yield the ids of its last steps."""
     upto, notes = builder.request.upto, builder.graph.notes
     if upto in STAGES and STAGES[upto].scope == "split":
         yield builder.product(upto, None)
         return
     for scene in builder.request.dataset.scenes:
-        if _identity(scene) in trained_on:
+        if scene.image_identity() in trained_on:
             notes.append(f"{scene.name} is a training scene: it is left out, since nothing is tested on it")
         elif upto in ("truth", "metrics") and not scene.has_truth:
             notes.append(f"{scene.name} has no ground truth: there are no metrics for it")
@@ -190,11 +192,6 @@ def _known(scene: SceneSource, product: str, notes: list[str]) -> str:
         return product
     notes.append(f"{scene.name}: the range of disparities is estimated first; a run shows what comes after `survey`")
     return "survey"
-
-
-def _identity(scene: SceneSource) -> str:
-    """Return what tells whether two scenes show the same pair."""
-    return json.dumps(scene.image_identity(), sort_keys=True)
 
 
 @dataclass

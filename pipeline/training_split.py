@@ -70,9 +70,7 @@ def assign_folds(names: Sequence[str], folds: int) -> tuple[int, ...]:
     (0, 1, 1, 0)
     """
     if len(names) < folds:
-        raise UsageError(
-            f"a calibration takes {folds} training scenes at least, one a fold, and there are {len(names)}"
-        )
+        raise UsageError(f"{folds} folds take {folds} scenes at least, one each, and there are {len(names)}")
     families = [name.rstrip("0123456789") for name in names]
     if len(set(families)) < folds:
         families = list(names)

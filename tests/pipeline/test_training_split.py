@@ -22,7 +22,7 @@ def test_folds_are_assigned(names: list[str], folds: int, expected: tuple[int, .
 
 
 def test_fewer_scenes_than_folds_are_refused() -> None:
-    with pytest.raises(UsageError, match="takes 3 training scenes at least, one a fold, and there are 2"):
+    with pytest.raises(UsageError, match="3 folds take 3 scenes at least, one each, and there are 2"):
         assign_folds(["a", "b"], 3)
 
 

@@ -9,12 +9,14 @@ from typing import Any
 
 import pytest
 
+from datasets import open_dataset
 from pipeline import compare
 from pipeline.api import Task
 from pipeline.comparison import ABLATION, EXPERIMENTS, MATCHERS, MEASURES, Comparison
 from pipeline.comparison_report import COLUMNS, print_comparison, write_comparison
 from pipeline.environment import missing_packages
 from pipeline.errors import UsageError
+from pipeline.protocols import protocol_requests
 from pipeline.quoted import NAMED, QUOTED
 from pipeline.reporting import report
 from stages.catalog import STAGES
@@ -100,6 +102,30 @@ def test_the_report_makes_nothing_and_leaves_out_other_settings(task: Task, tmp_
     assert {path for path in Path(str(task.cache)).rglob("*") if path.parent.name != "leases"} <= before
 
 
+def test_the_papers_protocols_stand_beside_ours(found: Comparison, task: Task) -> None:
+    """Two scenes: each is trained on and tested, and each is tested by networks that learnt from the other."""
+    two = replace(task, dataset=SPEC.replace("test=1", "test=2"))
+    made = compare(two, train_on=SPEC, protocols=("same", "folds"))
+    ours = [row for row in made.rows if "dual-cnn" in row["method"] or "Net" in row["method"]]
+    for experiment, method in (("raw", "dual-cnn"), ("density", "dual-cnn"), ("auc", "evaluation-Net")):
+        for name in ("trained on the same pairs", "2-fold"):
+            scenes = {r["scene"] for r in ours if (r["experiment"], r["method"]) == (experiment, f"{method}, {name}")}
+            assert scenes == {"test-0", "test-1"}
+    assert {row["method"] for row in made.rows if row["experiment"] == "curve"} == {"dual-cnn"}
+
+
+def test_the_folds_keep_a_place_together(task: Task) -> None:
+    """Another exposure of a scene that is tested is not learnt from."""
+    scenes = open_dataset(SPEC.replace("test=1", "test=4")).scenes
+    names = ["Piano", "PianoL", "Teddy", "Shelves"]
+    tested = tuple(replace(scene, name=name) for scene, name in zip(scenes[-4:], names, strict=True))
+    dataset = replace(open_dataset(SPEC), scenes=tested)
+    for request in protocol_requests("folds", task, dataset, scenes[:1]):
+        learnt, seen = ({scene.name for scene in each} for each in (request.training, request.dataset.scenes))
+        assert ("Piano" in seen) == ("PianoL" in seen)
+        assert learnt == {*names, scenes[0].name} - seen
+
+
 def test_what_needs_training_says_so_without_a_training_set(found: Comparison, task: Task) -> None:
     plain = compare(replace(task, dataset=TEST_ONLY), ("raw", "auc"))
     reasons = {each["method"]: each["why"] for each in plain.unavailable}
@@ -156,6 +182,8 @@ def test_tables_are_of_the_threshold_that_was_wished_for(found: Comparison, caps
     [
         pytest.param(["--experiment", "row"], "did you mean raw", id="an experiment that does not exist"),
         pytest.param(["--train-on", TEST_ONLY], "no training scene", id="nothing to train on"),
+        pytest.param(["--protocol", "fold"], "did you mean folds", id="a protocol that does not exist"),
+        pytest.param(["--protocol", "folds"], "2 folds take 2 scenes", id="too few scenes for folds"),
         pytest.param(["--threshold", "3"], "--threshold 3: figures are worked out for 0.5, 1, 2, 4 px", id="threshold"),
         pytest.param(["--set", "sgm.windo=3"], "did you mean sgm.window", id="a setting that does not exist"),
     ],
