@@ -60,9 +60,6 @@ def outside(scenes: Sequence[_Scene], folds: Sequence[int], fold: int) -> tuple[
 def assign_folds(names: Sequence[str], folds: int) -> tuple[int, ...]:
     """Return the fold of each scene: the smallest one so far, siblings together.
 
-    Siblings differ in a number at the end of their names, such as ``Cloth1`` and ``Cloth2``, which show much the same;
-    where all are siblings, each goes its own way.
-
     Raises:
         UsageError: if there are fewer scenes than folds.
 
@@ -71,12 +68,22 @@ def assign_folds(names: Sequence[str], folds: int) -> tuple[int, ...]:
     """
     if len(names) < folds:
         raise UsageError(f"{folds} folds take {folds} scenes at least, one each, and there are {len(names)}")
-    families = [name.rstrip("0123456789") for name in names]
-    if len(set(families)) < folds:
-        families = list(names)
+    each = families(names, folds)
     fold_of: dict[str, int] = {}
     sizes = [0] * folds
-    for family in families:
+    for family in each:
         fold = fold_of.setdefault(family, sizes.index(min(sizes)))
         sizes[fold] += 1
-    return tuple(fold_of[family] for family in families)
+    return tuple(fold_of[family] for family in each)
+
+
+def families(names: Sequence[str], fewest: int = 2) -> list[str]:
+    """Return what each name shares with its siblings: such as ``Cloth1`` and ``Cloth2``, they show much the same.
+
+    With fewer families than ``fewest`` each goes its own way.
+
+    >>> families(["Art", "Cloth1", "Cloth2"])
+    ['Art', 'Cloth', 'Cloth']
+    """
+    shared = [name.rstrip("0123456789") for name in names]
+    return shared if len(set(shared)) >= fewest else list(names)

@@ -3,14 +3,17 @@
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks import agreement, cost_volume, growth, memory, peers, timeline, training, transforms, workers
+from benchmarks import agreement, cost_volume, growth, memory, peers, recipe, timeline, training, transforms, workers
 from benchmarks.harness import Ratio, compare
+from datasets import open_dataset
 from pipeline.api import Result, Task, run
+from pipeline.errors import UsageError
 from stages.metrics import auc
 from tests.tiny import SETTINGS, SPEC
 
@@ -83,6 +86,24 @@ def test_the_choice_of_the_agreement_is_a_table(
         right = np.abs(disparity - truth["disparity"].values) <= 1
         areas.append(auc(result.open("confidence", scene)["network"].values[counted], right[counted]))
     assert found["auc"]["9"][0] == pytest.approx(np.mean(areas), abs=1e-3)
+
+
+def test_ways_of_training_are_judged_on_scenes_held_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    variant = " ".join(SETTINGS)
+    recipe.main(SPEC, [variant, f"{variant} matching_samples.slots=3"], held=["train-0"], cache=tmp_path / "cache")
+    assert "slots=3" in capsys.readouterr().out
+    found = json.loads((tmp_path / "build" / "bench" / "recipe.json").read_text())
+    assert (found["held"], found["scenes"], len(found["variants"])) == (["train-0"], 1, 2)
+    assert all(0 < each["raw_bad"]["train-0"] <= 100 for each in found["variants"].values())
+
+
+def test_siblings_of_what_is_held_out_are_not_learnt_from() -> None:
+    scenes = [replace(open_dataset(TINY).scenes[0], name=name) for name in ("2006/Cloth1", "2006/Cloth2", "2005/Books")]
+    tested, learnt = recipe.divide(scenes, ["Cloth2"])
+    assert [scene.name for scene in (*tested, *learnt)] == ["2006/Cloth2", "2005/Books"]
+    for held in (["Cloth3"], ["Cloth1", "Books"]):
+        with pytest.raises(UsageError, match="--held"):
+            recipe.divide(scenes, held)
 
 
 def test_a_time_line_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

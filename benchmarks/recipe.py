@@ -1,0 +1,89 @@
+"""What other ways of training do on scenes held out: ``python -m benchmarks.recipe DATASET --variant SETTINGS``.
+
+A matching-Net is trained anew for each variant, on the training scenes but those held out and their siblings, and its
+raw maps of the held-out scenes are judged. So settings are chosen without a look at the scenes of the final figures.
+To compare at equal cost, give each variant the steps that take as long; the table says how long they took.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.harness import write
+from datasets import SceneSource, open_dataset
+from pipeline.api import Result, Task, carry_out
+from pipeline.config import Config
+from pipeline.errors import UsageError
+from pipeline.progress import ProgressWatch
+from pipeline.steps import Request
+from pipeline.training_split import families, training_scenes
+from stages.metrics import raw_bad
+
+HELD = ("Laundry", "Bowling2", "Lampshade1", "Midd1", "Plastic", "Wood2")
+"""Scenes of Middlebury 2005 and 2006, easy and hard."""
+THRESHOLD = 1.0
+"""Largest error of a right disparity, px."""
+
+
+def main(
+    dataset: Annotated[str, typer.Argument(help="the training scenes, such as middlebury:DIR")],
+    variant: Annotated[list[str], typer.Option(help="settings, apart by a space: matching_net.steps=500 ...")],
+    held: Annotated[list[str] | None, typer.Option(help="scenes held out, instead of the usual ones")] = None,
+    cache: Annotated[Path | None, typer.Option(help="the cache's folder; default: the user's")] = None,
+) -> None:
+    """Print and write the raw error of each variant on each held-out scene."""
+    tested, learnt = divide(training_scenes(open_dataset(dataset)), held or HELD)
+    table = Table("variant", "trained, s", *(scene.name for scene in tested), "mean", box=None)
+    found = {}
+    for settings in variant:
+        request = Request(
+            replace(open_dataset(dataset), scenes=tested), {"": Config.load(settings=settings.split())},
+            "disparity", train=True, training=learnt, also=("truth",),
+        )  # fmt: skip
+        with ProgressWatch() as watch:
+            result = carry_out(Task(dataset, cache=cache), request, (), watch, None, None)
+        seconds = result.store.require(result.find("matching_net").key).seconds
+        errors = {scene.name: _raw_error(result, scene.name) for scene in tested}
+        found[settings] = {"seconds": seconds, "raw_bad": errors}
+        values = (*errors.values(), float(np.mean([*errors.values()])))
+        table.add_row(settings, f"{seconds:.0f}", *(f"{value:.2f}" for value in values))
+    write("recipe", {"held": [scene.name for scene in tested], "scenes": len(learnt), "variants": found})
+    print(f"raw error, %, > {THRESHOLD:g} px, nonocc; trained on {len(learnt)} other scenes")
+    Console(width=200).print(table)
+
+
+def divide(
+    scenes: Sequence[SceneSource], held: Sequence[str]
+) -> tuple[tuple[SceneSource, ...], tuple[SceneSource, ...]]:
+    """Return the scenes that are held out, and those that are neither held out nor siblings of one that is.
+
+    Raises:
+        UsageError: if a name fits no scene, or nothing is left to train on.
+    """
+    tested = tuple(scene for scene in scenes if scene.name.rsplit("/", 1)[-1] in held)
+    if len(tested) != len(set(held)):
+        known = ", ".join(scene.name.rsplit("/", 1)[-1] for scene in scenes)
+        raise UsageError(f"--held {', '.join(held)}: the training scenes are {known}")
+    names = [scene.name for scene in scenes]
+    family_of = dict(zip(names, families(names), strict=True))
+    kept = {family_of[scene.name] for scene in tested}
+    learnt = tuple(scene for scene in scenes if family_of[scene.name] not in kept)
+    if not learnt:
+        raise UsageError(f"--held {', '.join(held)}: no scene is left to train on")
+    return tested, learnt
+
+
+def _raw_error(result: Result, scene: str) -> float:
+    truth = result.open("truth", scene)
+    disparity = result.open("disparity", scene)["disparity"].values
+    return raw_bad(disparity, truth["disparity"].values, truth["nonocc"].values, THRESHOLD)
+
+
+if __name__ == "__main__":
+    typer.run(main)
