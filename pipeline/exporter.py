@@ -168,7 +168,7 @@ def _weights(result: Result, made: Made) -> bytes:
     if made.step.product == "calibration":
         return save_table(arrays, metadata)
     loss = {"loss": float(np.mean(arrays["loss"][-_LAST:], dtype=np.float64)), "steps": int(arrays["loss"].size)}
-    return save_weights(made.step.product, arrays["parameters"], metadata | loss)
+    return save_weights(made.step.product, arrays, metadata | loss)
 
 
 def writable_folder(folder: Path) -> None:

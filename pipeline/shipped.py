@@ -5,24 +5,18 @@ from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 
-from stages.evaluation.calibration_declaration import CALIBRATION
-from stages.stage import Array, Inputs, Output, Stage, StageError
+from stages.catalog import STAGES
+from stages.stage import Array, Inputs, Stage, StageError
 
 WEIGHTS = {
     product: Stage(
         product=product,
         inputs=(),
-        outputs=(Output("parameters", ("parameter",), "float32", "1", "weights that come with the package"),),
-        compute="pipeline.shipped:read_shipped_weights",
+        outputs=stage.outputs,
+        compute=f"pipeline.shipped:read_shipped_{'table' if product == 'calibration' else 'weights'}",
     )
-    for product in ("matching_net", "evaluation_net")
-} | {
-    "calibration": Stage(
-        product="calibration",
-        inputs=(),
-        outputs=CALIBRATION.outputs,
-        compute="pipeline.shipped:read_shipped_calibration",
-    )
+    for product, stage in STAGES.items()
+    if product in ("matching_net", "evaluation_net", "calibration")
 }
 _HOW = {
     "calibration": "no calibration comes with this installation: a wanted error and calibrated probabilities need one; "
@@ -51,13 +45,13 @@ def weights_digest(product: str) -> str:
 
 
 def read_shipped_weights(product: str, _: Inputs) -> dict[str, Array]:
-    """Return the shipped parameters of a network, checked."""
+    """Return a shipped network as its training left it, checked."""
     from stages.weights import read_weights
 
-    return {"parameters": read_weights(product, weights_file(product).read_bytes())}
+    return {**read_weights(product, weights_file(product).read_bytes())}
 
 
-def read_shipped_calibration(product: str, _: Inputs) -> dict[str, Array]:
+def read_shipped_table(product: str, _: Inputs) -> dict[str, Array]:
     """Return the shipped calibration, checked."""
     from stages.weights.tables import read_table
 

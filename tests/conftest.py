@@ -70,8 +70,9 @@ def weights(trained: "Result", tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     folder = tmp_path / "weights"
     folder.mkdir()
     for product in ("matching_net", "evaluation_net"):
-        parameters = trained.open(product)["parameters"].values
-        (folder / f"{product}.safetensors").write_bytes(save_weights(product, parameters, {}))
+        dataset = trained.open(product)
+        arrays = {name: dataset[name].values for name in ("parameters", "loss")}
+        (folder / f"{product}.safetensors").write_bytes(save_weights(product, arrays, {}))
     monkeypatch.setattr(shipped, "weights_file", lambda product: folder / f"{product}.safetensors")
     shipped.weights_digest.cache_clear()
     yield folder

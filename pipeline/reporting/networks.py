@@ -1,4 +1,4 @@
-"""How the networks learnt: the loss curve of trained ones, what is written in the file of shipped ones."""
+"""How the networks learnt: their loss curves, and of shipped ones what is written in the file."""
 
 import json
 from importlib.resources import as_file
@@ -21,25 +21,34 @@ def networks(found: Gathered) -> Html:
 
 
 def _network(found: Gathered, product: str, planned: Planned) -> Html:
-    if "shipped" in planned.step.settings:
-        return _shipped(product)
-    drawn = figure(product, found.store.open(planned.key or ""), title=f"{product}: training loss")
-    return svg(drawn, f"Training loss of {product} over its steps")
+    dataset, shipped = found.store.open(planned.key or ""), "shipped" in planned.step.settings
+    if shipped:
+        dataset = dataset.assign_attrs(params=_configuration(product).get(product, {}))
+    drawn = svg(
+        figure(product, dataset, title=f"{product}: training loss"), f"Training loss of {product} over its steps"
+    )
+    return _shipped(product) + drawn if shipped else drawn
 
 
 def _shipped(product: str) -> Html:
-    """Return what the package says of its own weights: they were trained elsewhere, and bring no curve."""
+    """Return what the package says of its own weights, which were trained elsewhere."""
     about = _metadata(product)
     steps = f", trained in {about['steps']:,} steps" if "steps" in about else ""
-    name = loss_name(about.get("configuration", {}).get(product, {}))
+    name = loss_name(_configuration(product).get(product, {}))
     loss = f" to a final loss of {about['loss']:.3f} ({name}, nats)" if "loss" in about else ""
     told = tag("p", text(f"{product}: the weights that come with the package{steps}{loss}."))
-    parts = about.get("configuration", {}).items()
+    parts = _configuration(product).items()
     settings = [[f"{part}.{name}", value] for part, fields in parts for name, value in fields.items()]
     if not settings:
         return told
     caption = f"Settings of the training of {product}"
     return told + folded(f"How {product} was trained", table(["setting", "value"], settings, caption=caption, words=2))
+
+
+def _configuration(product: str) -> dict[str, dict[str, Any]]:
+    """Return the settings that the shipped weights were trained with: product -> name -> value."""
+    found: dict[str, dict[str, Any]] = _metadata(product).get("configuration", {})
+    return found
 
 
 def _metadata(product: str) -> dict[str, Any]:

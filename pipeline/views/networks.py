@@ -1,4 +1,4 @@
-"""Figures of trained networks: how they learnt; of networks without a curve, what their parameters are like."""
+"""Figures of trained networks: how they learnt."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -17,20 +17,21 @@ _COIN = float(np.log(2))
 
 
 def draw_network(figure: Figure, dataset: xr.Dataset) -> None:
-    """Draw the loss of each training step; of shipped weights, which bring no curve, the parameters."""
+    """Draw the loss of each training step."""
     figure.set_size_inches(10, 5)
-    if "loss" in dataset:
-        _draw_loss(figure.subplots(), dataset["loss"].values, dataset.attrs.get("params", {}))
-    else:
-        _draw_parameters(figure.subplots(1, 2), dataset["parameters"].values)
+    _draw_loss(figure.subplots(), dataset["loss"].values, dataset.attrs.get("params", {}))
 
 
 def loss_name(params: Mapping[str, Any]) -> str:
-    """Return what the loss of a network consists of, by the settings of its training.
+    """Return what the loss of a network consists of, by the settings of its training; these may not be told.
 
     >>> loss_name({"ranking": 4.0}), loss_name({})
     ('class-balanced cross-entropy + 4 x ranking loss', 'class-balanced cross-entropy')
+    >>> loss_name({"shipped": "0123"})
+    'training loss'
     """
+    if "shipped" in params:
+        return "training loss"
     ranking = params.get("ranking", 0)
     return "class-balanced cross-entropy" + (f" + {ranking:g} x ranking loss" if ranking else "")
 
@@ -42,7 +43,8 @@ def _draw_loss(axes: Axes, loss: NDArray[np.float32], params: Mapping[str, Any])
     if smooth:
         steps = np.arange(window, loss.size + 1)
         axes.plot(steps, trailing_mean(loss, window), color=BLUE, linewidth=2, label=f"mean of the last {window} steps")
-    if not params.get("ranking"):  # what a guess costs in the ranking loss depends on the range of disparities
+    # What a guess costs in the ranking loss depends on the disparities that are compared.
+    if loss_name(params) == loss_name({}):
         axes.axhline(_COIN, color=RED, linestyle="--", linewidth=1.2, label="ln 2: a coin's guess")
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -61,14 +63,3 @@ def trailing_mean(values: NDArray[np.float32], window: int) -> NDArray[np.float6
     [2.0, 4.0]
     """
     return np.convolve(values.astype(np.float64), np.full(window, 1 / window), mode="valid")
-
-
-def _draw_parameters(axes: NDArray[np.object_], parameters: NDArray[np.float32]) -> None:
-    values, sizes = axes
-    values.hist(parameters, 80, color=BLUE)
-    values.set(xlabel="value of a parameter", ylabel="parameters (log scale)", yscale="log")
-    values.set_title(f"{parameters.size:,} parameters: {parameters.mean():.3g} ± {parameters.std():.3g}")
-    nonzero = np.abs(parameters[parameters != 0])
-    sizes.hist(np.log10(nonzero), 80, color=BLUE)
-    sizes.set(xlabel="log10 of a parameter's size", ylabel="parameters")
-    sizes.set_title(f"sizes; {parameters.size - nonzero.size:,} are zero")

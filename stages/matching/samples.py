@@ -6,9 +6,9 @@ within 0.5 px of it a match, more than 1 px away a mismatch, between them nothin
 
 * ``patch``, the paper's: a crop of one pixel with two disparities, the nearest to the truth and a
   random other one more than 1 px away.
-* ``dense``: a larger crop at every disparity of the scene's range, as the winner will be taken from. Of a
-  range too large for the slots, some are disparities of pixels in the crop (so that there are matches), some
-  lie just beside them (the mismatches that are hardest to tell), the rest anywhere.
+* ``dense``: a larger crop at some disparities of the scene's range: a third are disparities of pixels in the
+  crop (so that there are matches), a sixth lie just beside such ones (the mismatches that are hardest to
+  tell), the rest anywhere. More crops at few disparities teach more than few crops at all of them.
 
 Where the right view has ground truth, half the samples are *mirrored*: both views flipped and
 exchanged, which is again a rectified pair.

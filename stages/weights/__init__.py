@@ -1,4 +1,6 @@
-"""Weights as safetensors files: named tensors, with what they are and how they were made in the metadata.
+"""Weights as safetensors files: named tensors and the loss curve; what they are and how they were made in the metadata.
+
+They hold all that the trained product holds, so what was made with the one is found again with the other.
 
 No pickle is ever read. A file that is not exactly a network of this package is refused.
 """
@@ -18,8 +20,10 @@ from torch import nn
 from stages.evaluation.net import EvaluationNet
 from stages.matching.net import HEADS, MatchingNet
 from stages.parameters import count, from_vector, to_vector
-from stages.stage import StageError
+from stages.stage import Arrays, StageError
 
+LOSS = "loss"
+"""The tensor of a file that is no part of the network: float32 (step,)."""
 LARGEST = 64 * 2**20
 """Bytes; a larger file is refused before it is parsed."""
 MOST_CHANNELS = 3
@@ -38,28 +42,30 @@ def candidates(product: str) -> list[nn.Module]:
     raise StageError(f"{product} is no network: weights are those of matching_net or evaluation_net")
 
 
-def save_weights(product: str, parameters: NDArray[np.float32], metadata: Mapping[str, Any]) -> bytes:
-    """Return a network's parameters as a safetensors file.
+def save_weights(product: str, arrays: Arrays, metadata: Mapping[str, Any]) -> bytes:
+    """Return a trained network as a safetensors file.
 
     Args:
         product: ``matching_net`` or ``evaluation_net``.
-        parameters: float32 (parameter,), as the product holds them.
+        arrays: those of the product: ``parameters`` float32 (parameter,) and ``loss`` float32 (step,).
         metadata: JSON that says how they were made, such as the training configuration.
 
     Raises:
         StageError: if no network of the product has so many parameters, or one is not finite.
     """
+    parameters = arrays["parameters"]
     for net in candidates(product):
         if count(net) == parameters.size:
             from_vector(net, parameters)
             tensors = {name: tensor.contiguous() for name, tensor in net.state_dict().items()}
+            tensors[LOSS] = torch.from_numpy(arrays["loss"])
             texts = {"product": product} | {name: json.dumps(value, sort_keys=True) for name, value in metadata.items()}
             return save_tensors(tensors, metadata=texts)
     raise StageError(f"{product}: no network has {parameters.size} parameters")
 
 
-def read_weights(product: str, data: bytes) -> NDArray[np.float32]:
-    """Return the parameters in a safetensors file, as the product holds them: float32 (parameter,).
+def read_weights(product: str, data: bytes) -> dict[str, NDArray[np.float32]]:
+    """Return what is in a safetensors file as the product holds it: see ``save_weights``.
 
     Raises:
         StageError: if it is no such file, or its tensors are not those of the product's network, in
@@ -71,10 +77,11 @@ def read_weights(product: str, data: bytes) -> NDArray[np.float32]:
         tensors = load_tensors(data)
     except (SafetensorError, ValueError, KeyError) as error:
         raise StageError(f"the weights of {product} are no safetensors file: {_one_line(str(error))}") from None
+    loss = tensors.pop(LOSS, torch.zeros(()))
     for net in candidates(product):
         expected = net.state_dict()
         if {name: tensor.shape for name, tensor in tensors.items()} == {n: t.shape for n, t in expected.items()}:
-            return _vector(product, net, tensors)
+            return {"parameters": _vector(product, net, tensors), "loss": _curve(product, loss)}
     names = _one_line(", ".join(sorted(tensors)[:4]))
     raise StageError(f"the weights of {product} have other tensors than its network, or of other shapes: {names}…")
 
@@ -85,7 +92,18 @@ def _one_line(text: str, longest: int = 120) -> str:
 
 
 def _vector(product: str, net: nn.Module, tensors: Mapping[str, torch.Tensor]) -> NDArray[np.float32]:
-    if any(tensor.dtype != torch.float32 or not bool(torch.isfinite(tensor).all()) for tensor in tensors.values()):
+    if not all(map(_is_finite, tensors.values())):
         raise StageError(f"the weights of {product} must all be finite float32")
     net.load_state_dict(tensors)
     return to_vector(net)
+
+
+def _curve(product: str, loss: torch.Tensor) -> NDArray[np.float32]:
+    if loss.ndim != 1 or not _is_finite(loss):
+        raise StageError(f"the weights of {product} need the training's `{LOSS}`, finite float32 (step,)")
+    curve: NDArray[np.float32] = loss.numpy()
+    return curve
+
+
+def _is_finite(tensor: torch.Tensor) -> bool:
+    return tensor.dtype == torch.float32 and bool(torch.isfinite(tensor).all())

@@ -82,7 +82,7 @@ class Run:
 
     def nets(self) -> tuple[Made, Made]:
         """Add shipped weights."""
-        arrays = {"parameters": np.zeros(3, np.float32)}
+        arrays = {"parameters": np.zeros(3, np.float32), "loss": np.ones(1, np.float32)}
         return tuple(self.add(name, SPLIT, arrays, stage=shipped.WEIGHTS[name]) for name in NETS)
 
     def result(self) -> Result:
@@ -223,7 +223,9 @@ def test_trained_weights_come_with_how_they_were_made(run: Run, tmp_path: Path) 
     run.targets.append((trained.step.id, ""))
     written = export(run.result(), tmp_path / "out")
     assert names(written, tmp_path / "out") == ["evaluation_net.safetensors", "config.json"]
-    np.testing.assert_array_equal(read_weights("evaluation_net", written[0].read_bytes()), parameters)
+    again = read_weights("evaluation_net", written[0].read_bytes())
+    np.testing.assert_array_equal(again["parameters"], parameters)
+    assert again["loss"].tolist() == [9.0] * 50 + [0.25] * 50
     with safe_open(written[0], "numpy") as file:
         metadata = file.metadata()
     told = {name: json.loads(text) for name, text in metadata.items() if name != "product"}

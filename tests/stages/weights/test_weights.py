@@ -19,7 +19,8 @@ from stages.weights import candidates, read_weights, save_weights
 from tests.stages.matching.reference import NETS, random_net
 
 VECTOR = to_vector(random_net())
-FILE = save_weights("matching_net", VECTOR, {})
+LOSS = np.array([0.7, 0.25], np.float32)
+FILE = save_weights("matching_net", {"parameters": VECTOR, "loss": LOSS}, {})
 
 
 def changed(**tensors: torch.Tensor | None) -> bytes:
@@ -35,13 +36,15 @@ def bias(dtype: torch.dtype = torch.float32, value: float = 0.5) -> torch.Tensor
 @pytest.mark.parametrize(("channels", "head"), NETS)
 def test_the_round_trip_of_a_matching_net_is_exact(channels: int, head: Head) -> None:
     vector = to_vector(random_net(channels, head))
-    again = read_weights("matching_net", save_weights("matching_net", vector, {}))
-    assert again.dtype == np.float32 and np.array_equal(again, vector)
+    again = read_weights("matching_net", save_weights("matching_net", {"parameters": vector, "loss": LOSS}, {}))
+    assert all(array.dtype == np.float32 for array in again.values())
+    assert np.array_equal(again["parameters"], vector) and np.array_equal(again["loss"], LOSS)
 
 
 def test_the_round_trip_of_an_evaluation_net_is_exact() -> None:
     vector = np.random.default_rng(0).normal(size=count(EvaluationNet())).astype(np.float32)
-    assert np.array_equal(read_weights("evaluation_net", save_weights("evaluation_net", vector, {})), vector)
+    data = save_weights("evaluation_net", {"parameters": vector, "loss": LOSS}, {})
+    assert np.array_equal(read_weights("evaluation_net", data)["parameters"], vector)
 
 
 def test_the_number_of_parameters_tells_the_network() -> None:
@@ -51,15 +54,16 @@ def test_the_number_of_parameters_tells_the_network() -> None:
 
 def test_the_file_says_what_it_is_and_how_it_was_made(tmp_path: pytest.TempPathFactory) -> None:
     file = tmp_path / "net.safetensors"
-    file.write_bytes(save_weights("matching_net", VECTOR, {"params": {"steps": 3, "head": "compact"}}))
+    arrays = {"parameters": VECTOR, "loss": LOSS}
+    file.write_bytes(save_weights("matching_net", arrays, {"params": {"steps": 3, "head": "compact"}}))
     with safe_open(file, "numpy") as opened:
         assert opened.metadata()["product"] == "matching_net"
         assert json.loads(opened.metadata()["params"]) == {"head": "compact", "steps": 3}
-        assert set(opened.keys()) == set(MatchingNet().state_dict())
+        assert set(opened.keys()) == {*MatchingNet().state_dict(), "loss"}
 
 
 def test_the_same_weights_give_the_same_bytes() -> None:
-    assert save_weights("matching_net", VECTOR, {}) == FILE
+    assert save_weights("matching_net", {"parameters": VECTOR, "loss": LOSS}, {}) == FILE
 
 
 class Payload:
@@ -110,6 +114,10 @@ def test_a_payload_in_place_of_weights_never_runs(tmp_path: Path) -> None:
         pytest.param(changed(**{"out.bias": bias(torch.float64)}), "must all be finite float32", id="float64"),
         pytest.param(changed(**{"out.bias": bias(torch.float16)}), "must all be finite float32", id="float16"),
         pytest.param(changed(**{"out.bias": bias(torch.int32)}), "must all be finite float32", id="integers"),
+        pytest.param(changed(loss=None), "need the training's `loss`", id="no loss"),
+        pytest.param(changed(loss=torch.zeros(1, 1)), "need the training's `loss`", id="a loss that is no curve"),
+        pytest.param(changed(loss=bias(torch.float64)), "need the training's `loss`", id="a loss in float64"),
+        pytest.param(changed(loss=bias(value=float("nan"))), "need the training's `loss`", id="a loss that is NaN"),
     ],
 )
 def test_refuses(data: bytes, message: str) -> None:
@@ -139,7 +147,7 @@ def test_other_products_are_no_networks(product: str) -> None:
     with pytest.raises(StageError, match="is no network"):
         read_weights(product, FILE)
     with pytest.raises(StageError, match="is no network"):
-        save_weights(product, VECTOR, {})
+        save_weights(product, {"parameters": VECTOR, "loss": LOSS}, {})
 
 
 @pytest.mark.parametrize(
@@ -151,4 +159,4 @@ def test_other_products_are_no_networks(product: str) -> None:
 )
 def test_saving_refuses(vector: np.ndarray, message: str) -> None:
     with pytest.raises(StageError, match=message):
-        save_weights("matching_net", vector, {})
+        save_weights("matching_net", {"parameters": vector, "loss": LOSS}, {})
