@@ -51,14 +51,14 @@ def save_weights(product: str, arrays: Arrays, metadata: Mapping[str, Any]) -> b
         metadata: JSON that says how they were made, such as the training configuration.
 
     Raises:
-        StageError: if no network of the product has so many parameters, or one is not finite.
+        StageError: if no network of the product has so many parameters, one is not finite, or the loss is no curve.
     """
     parameters = arrays["parameters"]
     for net in candidates(product):
         if count(net) == parameters.size:
             from_vector(net, parameters)
             tensors = {name: tensor.contiguous() for name, tensor in net.state_dict().items()}
-            tensors[LOSS] = torch.from_numpy(arrays["loss"])
+            tensors[LOSS] = torch.from_numpy(_curve(product, torch.from_numpy(arrays["loss"])))
             texts = {"product": product} | {name: json.dumps(value, sort_keys=True) for name, value in metadata.items()}
             return save_tensors(tensors, metadata=texts)
     raise StageError(f"{product}: no network has {parameters.size} parameters")

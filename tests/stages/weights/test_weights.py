@@ -160,3 +160,9 @@ def test_other_products_are_no_networks(product: str) -> None:
 def test_saving_refuses(vector: np.ndarray, message: str) -> None:
     with pytest.raises(StageError, match=message):
         save_weights("matching_net", {"parameters": vector, "loss": LOSS}, {})
+
+
+@pytest.mark.parametrize("loss", [LOSS.astype(np.float64), LOSS[None], np.array([np.nan], np.float32)])
+def test_a_loss_that_could_not_be_read_again_is_not_saved(loss: np.ndarray) -> None:
+    with pytest.raises(StageError, match="need the training's `loss`"):
+        save_weights("matching_net", {"parameters": VECTOR, "loss": loss}, {})
