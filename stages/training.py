@@ -1,4 +1,4 @@
-"""The training loop that both networks share: Adam, a falling rate, exact resume.
+"""The training loop that both networks share: shards, clipping, a schedule, exact resume.
 
 A step's loss is the mean over a fixed number of *shards*, each computed by one thread on one core,
 and the gradients are added in the shards' order. So the result does not depend on how many cores
@@ -18,6 +18,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from stages.allocator import keep_freed_memory
+from stages.optimiser import optimisers_of
 from stages.schedule import SHARDS, Schedule
 from stages.stage import Monitor, StageError
 
@@ -44,7 +45,7 @@ def one_thread() -> None:
 def fit(net: nn.Module, loss: Loss, schedule: Schedule, monitor: Monitor) -> NDArray[np.float32]:
     """Train ``net`` in place and return the loss of each step.
 
-    A checkpoint holds the parameters, Adam's moments and the curve so far; since ``loss`` is a pure
+    A checkpoint holds the parameters, what the optimisers remember and the curve so far; since ``loss`` is a pure
     function of step and shard, a resumed training gives bit for bit what an undisturbed one gives.
 
     Args:
@@ -61,59 +62,76 @@ def fit(net: nn.Module, loss: Loss, schedule: Schedule, monitor: Monitor) -> NDA
     """
     keep_freed_memory()
     parameters = list(net.parameters())
-    optimiser = torch.optim.Adam(parameters, lr=schedule.first_rate)
-    curve = _resume(net, optimiser, monitor.load())
+    optimisers = optimisers_of(net, schedule)
+    curve = _resume(net, optimisers, monitor.load())
     with ThreadPoolExecutor(SHARDS, initializer=one_thread) as pool:
         for step in range(len(curve), schedule.steps):
-            curve.append(_step(parameters, optimiser, loss, step, schedule, pool))
+            value, gradients = _gradients(parameters, loss, step, pool)
+            curve.append(value)
+            # In the pool, where an operation has one thread: how many share a sum decides its last bits.
+            pool.submit(_update, parameters, gradients, optimisers, schedule.clip, schedule.rate(step)).result()
             monitor.progress(step + 1, schedule.steps, f"loss {np.mean(curve[-50:]):.4f}")
             if (step + 1) % schedule.checkpoint_steps == 0:
-                monitor.save(_checkpoint(net, optimiser, curve))
+                monitor.save(_checkpoint(net, optimisers, curve))
     return np.array(curve, np.float32)
 
 
-def _step(
-    parameters: Sequence[Tensor],
-    optimiser: torch.optim.Optimizer,
-    loss: Loss,
-    step: int,
-    schedule: Schedule,
-    pool: ThreadPoolExecutor,
-) -> float:
-    """Take one step and return its loss."""
+def _gradients(
+    parameters: Sequence[Tensor], loss: Loss, step: int, pool: ThreadPoolExecutor
+) -> tuple[float, list[Tensor]]:
+    """Return the loss of a step and its gradient for each parameter, both the mean over the shards."""
 
-    def shard_gradients(shard: int) -> tuple[float, tuple[Tensor, ...]]:
+    def of_shard(shard: int) -> tuple[float, tuple[Tensor, ...]]:
         value = loss(step, shard)
         # Not backward(): two threads would add into the same .grad in an order nobody fixed.
         return value.item(), torch.autograd.grad(value, parameters)
 
-    parts = list(pool.map(shard_gradients, range(SHARDS)))
+    parts = list(pool.map(of_shard, range(SHARDS)))
     value = float(np.mean([part[0] for part in parts]))
     if not np.isfinite(value):
         raise StageError(f"the loss is {value} at step {step}: lower the learning rate or look at the samples")
-    for parameter, *gradients in zip(parameters, *(part[1] for part in parts), strict=True):
-        parameter.grad = cast(Tensor, sum(gradients)) / SHARDS
-    nn.utils.clip_grad_norm_(parameters, schedule.clip)
-    optimiser.param_groups[0]["lr"] = schedule.rate(step)
-    optimiser.step()
-    return value
+    return value, [cast(Tensor, sum(each)) / SHARDS for each in zip(*(part[1] for part in parts), strict=True)]
 
 
-def _checkpoint(net: nn.Module, optimiser: torch.optim.Adam, curve: list[float]) -> bytes:
+def _update(
+    parameters: Sequence[Tensor],
+    gradients: Sequence[Tensor],
+    optimisers: Sequence[torch.optim.Optimizer],
+    clip: float,
+    rate: float,
+) -> None:
+    """Move the parameters by one step."""
+    for parameter, gradient in zip(parameters, gradients, strict=True):
+        parameter.grad = gradient
+    nn.utils.clip_grad_norm_(parameters, clip)
+    for optimiser in optimisers:
+        optimiser.param_groups[0]["lr"] = rate
+        optimiser.step()
+
+
+def _checkpoint(net: nn.Module, optimisers: Sequence[torch.optim.Optimizer], curve: list[float]) -> bytes:
     tensors = {f"net.{name}": tensor for name, tensor in net.state_dict().items()}
-    for index, state in enumerate(optimiser.state.values()):
-        tensors |= {f"adam.{index}.{name}": tensor for name, tensor in state.items()}
+    for number, optimiser in enumerate(optimisers):
+        for index, state in enumerate(optimiser.state.values()):
+            tensors |= {f"{number}.{index}.{name}": tensor for name, tensor in state.items()}
     tensors["curve"] = torch.tensor(curve, dtype=torch.float64)
     return save_tensors({name: tensor.contiguous() for name, tensor in tensors.items()})
 
 
-def _resume(net: nn.Module, optimiser: torch.optim.Adam, checkpoint: bytes | None) -> list[float]:
-    """Put ``net`` and ``optimiser`` where the checkpoint left them; return the curve so far."""
+def _resume(net: nn.Module, optimisers: Sequence[torch.optim.Optimizer], checkpoint: bytes | None) -> list[float]:
+    """Put ``net`` and its optimisers where the checkpoint left them; return the curve so far."""
     if checkpoint is None:
         return []
     tensors = load_tensors(checkpoint)
     net.load_state_dict({name: tensors[f"net.{name}"] for name in net.state_dict()})
-    for index, parameter in enumerate(net.parameters()):
-        names = ("step", "exp_avg", "exp_avg_sq")
-        optimiser.state[parameter] = {name: tensors[f"adam.{index}.{name}"] for name in names}
+    for number, optimiser in enumerate(optimisers):
+        for index, parameter in enumerate(optimiser.param_groups[0]["params"]):
+            place = f"{number}.{index}."
+            known = {name.removeprefix(place): tensor for name, tensor in tensors.items() if name.startswith(place)}
+            optimiser.state[parameter] = {name: _laid_out(tensor, parameter) for name, tensor in known.items()}
     return [float(value) for value in tensors["curve"]]
+
+
+def _laid_out(tensor: Tensor, parameter: Tensor) -> Tensor:
+    """Return ``tensor`` in the memory order of ``parameter``: in another one, sums may end in other last bits."""
+    return torch.empty_like(parameter).copy_(tensor) if tensor.shape == parameter.shape else tensor

@@ -161,7 +161,7 @@ class ForestParams(Params):
 class CcnnParams(Schedule):
     """The CCNN and how it is trained."""
 
-    first_rate: float = Field(0.001, gt=0, description="learning rate of the first step")
+    peak_rate: float = Field(0.002, gt=0, description="highest learning rate")
     crop: int = Field(64, ge=1, le=512, description="side of a training crop, px")
     batch: int = Field(4, ge=SHARDS, multiple_of=SHARDS, description="crops a step; a multiple of the number of shards")
     tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")

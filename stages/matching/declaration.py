@@ -24,7 +24,7 @@ class MatchingSamplesParams(Params):
     """What the matching-Net learns from."""
 
     form: Form = Field("dense", description="dense crops, or the paper's patches")
-    samples: int = Field(14400, ge=1, description="samples in all, over the scenes in equal parts")
+    samples: int = Field(18000, ge=1, description="samples in all, over the scenes in equal parts")
     height: int = Field(16, ge=1, le=256, description="rows of a dense crop, px")
     width: int = Field(32, ge=1, le=256, description="columns of a dense crop, px")
     slots: int = Field(12, ge=3, le=512, description="most disparities a dense crop is compared at")
@@ -45,7 +45,7 @@ class MatchingSamplesParams(Params):
 class MatchingNetParams(Schedule):
     """The matching-Net and how it is trained."""
 
-    steps: int = Field(3600, ge=1, description="optimiser steps")
+    steps: int = Field(4500, ge=1, description="optimiser steps")
     head: Head = Field("compact", description="hidden layers: 128 units, or the paper's 1600 and 128")
     batch: int = Field(
         4, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"
