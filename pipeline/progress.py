@@ -72,6 +72,8 @@ class ProgressWatch:
             row = self._rows.get(step.id)
             if row is None:
                 return
+            if step.stage.monitored and row.found is None:
+                row.found = done - 1
             row.done = done if step.stage.monitored else row.done + done
             self._bars.update(row.task, completed=row.done, total=total, note=note)  # type: ignore[arg-type]
             self._say(step, row, total, note)
@@ -81,7 +83,7 @@ class ProgressWatch:
         now = time.monotonic()
         if self._bars.disable and row.done < total and now - row.said >= LINE_SECONDS:
             row.said = now
-            left = (now - row.started) / row.done * (total - row.done)
+            left = (now - row.started) / (row.done - (row.found or 0)) * (total - row.done)
             text = f"{step.name}: {row.done} of {total}, about {left:.0f} s left {note}"
             self._console.print(text.rstrip(), highlight=False, soft_wrap=True, markup=False)
 
@@ -104,3 +106,5 @@ class _Row:
         self.task = task
         self.started = self.said = now
         self.done = 0
+        self.found: int | None = None
+        """Steps of a training that a checkpoint had already: they took none of the time since."""

@@ -31,7 +31,7 @@ class EvaluationSamplesParams(Params):
 class EvaluationNetParams(Schedule):
     """The evaluation-Net and how it is trained."""
 
-    steps: int = Field(2000, ge=1, description="optimiser steps")
+    steps: int = Field(1600, ge=1, description="optimiser steps")
     peak_rate: float = Field(0.002, gt=0, description="highest learning rate")
     batch: int = Field(
         8, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"

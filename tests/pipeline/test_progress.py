@@ -51,6 +51,15 @@ def test_without_a_terminal_long_work_says_a_line_now_and_then(
     ]
 
 
+def test_steps_of_a_checkpoint_took_no_time(capsys: pytest.CaptureFixture[str], now: list[float]) -> None:
+    with ProgressWatch() as watch:
+        watch.begun(TRAINED, NO_DRAFT, 1)
+        for done in range(61, 101):
+            now[0] = (done - 60) * 1.0
+            watch.advanced(TRAINED, done, 100, "")
+    assert capsys.readouterr().err == "sum of Toy: 80 of 100, about 20 s left\n"
+
+
 def test_tiles_add_up(capsys: pytest.CaptureFixture[str], now: list[float]) -> None:
     with ProgressWatch() as watch:
         watch.begun(TILED, NO_DRAFT, 4)
