@@ -28,15 +28,9 @@ from stages.transforms.channels import channels
 
 def measure(scene: SceneSource, net: MatchingNet, rows: int) -> dict[str, Any]:
     """Return raw error (> 1 px, nonocc, %) in both precisions, changed disparities and the cost difference."""
-    loaded = scene.load()
-    if loaded.truth is None:
-        raise typer.BadParameter(f"{scene.name} has no ground truth")
-    first = max(RADIUS, (scene.size[0] - rows) // 2)
-    block = channels(loaded.left, loaded.right)[:, :, first - RADIUS : first + rows + RADIUS]
-    truth = loaded.truth.disparity[first : first + rows]
-    mask = loaded.truth.nonocc[first : first + rows]
+    block, truth, mask = middle_rows(scene, rows)
     disparities = range(scene.disparities.minimum, scene.disparities.maximum + 1)
-    costs = {precision: _costs(net, block, disparities, precision) for precision in ("float32", "bfloat16")}
+    costs = {precision: block_costs(net, block, disparities, precision) for precision in ("float32", "bfloat16")}
     maps = {precision: winner_take_all(cost, disparities.start) for precision, cost in costs.items()}
     changed = np.abs(maps["bfloat16"] - maps["float32"])[mask]
     return {
@@ -49,7 +43,17 @@ def measure(scene: SceneSource, net: MatchingNet, rows: int) -> dict[str, Any]:
     }
 
 
-def _costs(
+def middle_rows(scene: SceneSource, rows: int) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+    """Return the channels of some rows with their context, their true disparities, and which of them count."""
+    loaded = scene.load()
+    if loaded.truth is None:
+        raise typer.BadParameter(f"{scene.name} has no ground truth")
+    first = max(RADIUS, (scene.size[0] - rows) // 2)
+    block = channels(loaded.left, loaded.right)[:, :, first - RADIUS : first + rows + RADIUS]
+    return block, loaded.truth.disparity[first : first + rows], loaded.truth.nonocc[first : first + rows]
+
+
+def block_costs(
     net: MatchingNet, block: NDArray[np.float32], disparities: range, precision: Precision
 ) -> NDArray[np.float32]:
     """Return the costs of a block that brings its rows of context, but not what lies beyond its sides."""

@@ -8,12 +8,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
-from benchmarks import agreement, cost_volume, growth, memory, peers, recipe, timeline, training, transforms, workers
+from benchmarks import (
+    agreement,
+    cost_volume,
+    growth,
+    low_rank,
+    memory,
+    peers,
+    recipe,
+    timeline,
+    training,
+    transforms,
+    workers,
+)
 from benchmarks.harness import Ratio, compare
 from datasets import open_dataset
 from pipeline.api import Result, Task, run
 from pipeline.errors import UsageError
+from stages.matching.net import MatchingNet
 from stages.metrics import auc
 from tests.tiny import SETTINGS, SPEC
 
@@ -104,6 +118,24 @@ def test_siblings_of_what_is_held_out_are_not_learnt_from() -> None:
     for held in (["Cloth3"], ["Cloth1", "Books"]):
         with pytest.raises(UsageError, match="--held"):
             recipe.divide(scenes, held)
+
+
+def test_a_head_of_lower_rank_is_judged(tmp_path: Path) -> None:
+    low_rank.main(TINY, [8], rows=8)
+    found = json.loads((tmp_path / "build" / "bench" / "low_rank.json").read_text())
+    few, all_of_them = found["ranks"]
+    assert (few["rank"], all_of_them["rank"]) == (8, 128)
+    assert few["kernel kept, %"] < 90 and all_of_them["kernel kept, %"] == pytest.approx(100)
+    assert few["multiplications, %"] < all_of_them["multiplications, %"] == 100
+    assert all(0 <= row["raw error, %"] <= 100 for row in found["ranks"])
+
+
+def test_a_kernel_of_full_rank_stays_and_one_of_rank_one_has_proportional_filters() -> None:
+    net = MatchingNet(1)
+    whole, kept = low_rank.truncated(net, 128)
+    assert torch.allclose(whole.hidden[0].weight, net.hidden[0].weight, atol=1e-5) and kept == pytest.approx(1)
+    least, _ = low_rank.truncated(net, 1)
+    assert torch.linalg.matrix_rank(least.hidden[0].weight.reshape(128, -1), rtol=1e-4) == 1
 
 
 def test_a_time_line_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
