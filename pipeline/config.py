@@ -60,6 +60,7 @@ class Config(BaseModel):
     census: WindowParams = WindowParams()
     sncc: WindowParams = WindowParams()
     mc_cnn: CheckedParams = CheckedParams()
+    mc_cnn_accurate: CheckedParams = CheckedParams()
     cost_confidence: CostConfidenceParams = CostConfidenceParams()
     o1_forest: ForestParams = ForestParams()
     ccnn_net: CcnnParams = CcnnParams()

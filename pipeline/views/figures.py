@@ -52,7 +52,7 @@ _DRAW: Mapping[str, Callable[..., None]] = {
     "refined": draw_disparity,
     "filled": draw_disparity,
     "metrics": draw_metrics,
-    **dict.fromkeys(("sgm", "census", "sncc", "mc_cnn"), draw_disparity),
+    **dict.fromkeys(("sgm", "census", "sncc", "mc_cnn", "mc_cnn_accurate"), draw_disparity),
     **dict.fromkeys(("o1", "ccnn"), draw_confidence),
     "ccnn_net": draw_network,
 }

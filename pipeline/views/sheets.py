@@ -17,7 +17,13 @@ if TYPE_CHECKING:
 
 SCENES = 3
 """Scenes on a sheet, at most."""
-_OTHERS = {"sgm": "SGM", "sncc": "SNCC", "census": "census", "mc_cnn": "MC-CNN fast"}
+_OTHERS = {
+    "sgm": "SGM",
+    "sncc": "SNCC",
+    "census": "census",
+    "mc_cnn": "MC-CNN fast",
+    "mc_cnn_accurate": "MC-CNN accurate",
+}
 _FLAT = 2
 """Gray levels between neighbours up to which a pixel counts as untextured."""
 _WIDTH = 2.6

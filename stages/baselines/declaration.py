@@ -174,6 +174,9 @@ O1_SIDES = (5, 7, 9, 11)
 CCNN_RADIUS = 4
 """Half of CCNN's patch of 9 x 9 px."""
 
+MC_CNN_RADIUS = 5
+"""Half of MC-CNN's patch of 11 x 11 px."""
+
 MC_CNN = Stage(
     product="mc_cnn",
     inputs=("images",),
@@ -183,6 +186,18 @@ MC_CNN = Stage(
     needs=("mccnn",),
 )
 """MC-CNN fast with its Middlebury weights, winner takes all. Not tiled: it standardises whole views."""
+
+MC_CNN_ACCURATE = Stage(
+    product="mc_cnn_accurate",
+    inputs=("images",),
+    outputs=(_DENSE, _CHECKED),
+    compute="stages.baselines.mc_cnn:compute_mc_cnn_accurate",
+    params=CheckedParams,
+    tile_rows=32,
+    halo=lambda _: MC_CNN_RADIUS,
+    needs=("mccnn",),
+)
+"""MC-CNN accurate with its Middlebury weights, winner takes all; as slow as an exact cost volume."""
 
 O1_FOREST = Stage(
     product="o1_forest",
@@ -233,5 +248,5 @@ CCNN = Stage(
     border="edge",
 )
 
-BASELINES = (SGM, CENSUS, SNCC, MC_CNN, COST_CONFIDENCE, O1_FOREST, O1, CCNN_NET, CCNN)
+BASELINES = (SGM, CENSUS, SNCC, MC_CNN, MC_CNN_ACCURATE, COST_CONFIDENCE, O1_FOREST, O1, CCNN_NET, CCNN)
 """All of them, in an order in which each comes after what it is made from."""

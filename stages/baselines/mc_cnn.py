@@ -1,18 +1,23 @@
-"""MC-CNN fast as the ``mccnn`` package has it, with the weights that it learnt on Middlebury."""
+"""MC-CNN fast and accurate as the ``mccnn`` package has them, with the weights that they learnt on Middlebury.
+
+Source: Žbontar & LeCun, "Stereo matching by training a convolutional neural network to compare image patches",
+JMLR 2016.
+"""
 
 from importlib import resources
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
-from stages.baselines.declaration import CheckedParams
+from stages.baselines.declaration import MC_CNN_RADIUS, CheckedParams
 from stages.baselines.window import match_windows
 from stages.stage import Arrays, Inputs
+from stages.training import one_thread
 from stages.transforms.gray import to_gray
 
-_WEIGHTS = "mc_cnn_fast_mb_weights.pt"
-_RADIUS = 5
-"""Half of the network's patch of 11 x 11 px."""
+_FAST, _ACCURATE = "mc_cnn_fast_mb_weights.pt", "mc_cnn_accurate_mb_weights.pt"
 
 
 def mc_cnn_costs(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float32]:
@@ -25,14 +30,11 @@ def mc_cnn_costs(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities:
 
     Returns:
         (y, x, d) float32, lower is better. The views are continued by their edge, so that border pixels are answered.
-
-    Source: Žbontar & LeCun, "Stereo matching by training a convolutional neural network to compare image patches",
-    JMLR 2016.
     """
     from mc_cnn.run import run_mc_cnn_fast
 
-    views = (np.pad(view.astype(np.float32), _RADIUS, mode="edge") for view in (left, right))
-    weights = resources.files("mc_cnn") / "weights" / _WEIGHTS
+    views = (np.pad(view.astype(np.float32), MC_CNN_RADIUS, mode="edge") for view in (left, right))
+    weights = resources.files("mc_cnn") / "weights" / _FAST
     # The package answers where a patch lies within the view, here at every pixel of the view that was continued;
     # its disparity has the other sign, so its last slice is our first.
     costs = run_mc_cnn_fast(*views, -disparities[-1], -disparities[0], str(weights))
@@ -49,3 +51,33 @@ def compute_mc_cnn(params: CheckedParams, inputs: Inputs) -> Arrays:
         return volume[:, columns, d - disparities[0]]
 
     return match_windows(costs, left.shape, disparities, 1, params.tolerance)
+
+
+def compute_mc_cnn_accurate(params: CheckedParams, inputs: Inputs) -> Arrays:
+    """Compute a tile of the product ``mc_cnn_accurate``: as ``mc_cnn``, by the network that joins the two views."""
+    from mc_cnn.model.mc_cnn_accurate import AccMcCnnInfer
+
+    weights = str(resources.files("mc_cnn") / "weights" / _ACCURATE)
+    net = AccMcCnnInfer()
+    net.load_state_dict(torch.load(weights, map_location="cpu", weights_only=True)["model"])
+    one_thread()
+    images = inputs["images"]
+    with torch.inference_mode():
+        left, right = (
+            net.conv_blocks(_standardised(images[view], *images["moments"][index]))[0].permute(1, 2, 0)
+            for index, view in enumerate(("left", "right"))
+        )
+
+        def costs(_: int, columns: slice, seen: slice) -> NDArray[np.float32]:
+            # Without its sigmoid at the end, which makes ties of what is nearly certain.
+            alike = net.fl_blocks[:-1](torch.cat([left[:, columns], right[:, seen]], 2))
+            made: NDArray[np.float32] = -alike[..., 0].numpy()
+            return made
+
+        return match_windows(costs, images["left"].shape[:2], params.disparities, 1, params.tolerance)
+
+
+def _standardised(view: NDArray[np.generic], mean: float, deviation: float) -> Tensor:
+    """Return the gray of a view at mean 0 and deviation 1, continued by its edge: (1, 1, y + 10, x + 10)."""
+    gray = (to_gray(view) - mean) / max(deviation, 1.0)
+    return torch.from_numpy(np.pad(gray, MC_CNN_RADIUS, mode="edge").astype(np.float32))[None, None]

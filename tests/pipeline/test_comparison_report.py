@@ -5,7 +5,8 @@ import io
 import pytest
 from rich.console import Console
 
-from pipeline.comparison import ABLATION, MATCHERS
+from pipeline.ablation import ABLATION
+from pipeline.comparison import MATCHERS
 from pipeline.comparison_report import _by_scene, _fitted
 from pipeline.comparison_rows import OURS
 
