@@ -141,17 +141,25 @@ def print_comparison(found: Comparison, masks: Iterable[str], threshold: float =
 
 
 def _by_scene(rows: Sequence[Row], means: Sequence[Row], experiment: str, figure: str) -> Table:
-    """Return a table with a row a scene and a column a method."""
-    columns = {row["method"]: (row["method"], figure) for row in means}
+    """Return a table of scenes and methods: down goes whichever are more."""
+    methods = {row["method"]: (row["method"], figure) for row in means}
     if experiment == "auc":
-        columns["optimal"] = (means[0]["method"], "auc_optimal")
-    table = _table(_TITLES[experiment], "scene", *columns)
-    cells = {(row["scene"], row["method"]): row for row in rows}
-    of_mean = {row["method"]: row for row in means}
-    for scene in dict.fromkeys(row["scene"] for row in rows):
-        shown = (_cell(cells.get((scene, method), {}), name) for method, name in columns.values())
-        table.add_row(escape(scene), *shown)
-    table.add_row("mean", *(_cell(of_mean[method], name) for method, name in columns.values()))
+        methods["optimal"] = (means[0]["method"], "auc_optimal")
+    cells = {(row["scene"], row["method"]): row for row in rows} | {("mean", row["method"]): row for row in means}
+    scenes = [*dict.fromkeys(row["scene"] for row in rows), "mean"]
+    shown = {
+        (scene, name): _cell(cells.get((scene, method), {}), value)
+        for scene in scenes
+        for name, (method, value) in methods.items()
+    }
+    if len(methods) < len(scenes):
+        table = _table(_TITLES[experiment], "scene", *methods)
+        for scene in scenes:
+            table.add_row(escape(scene), *(shown[scene, name] for name in methods))
+    else:
+        table = _table(_TITLES[experiment], "method", *scenes)
+        for name in methods:
+            table.add_row(escape(name), *(shown[scene, name] for scene in scenes))
     return table
 
 
