@@ -58,7 +58,7 @@ def fit(net: nn.Module, loss: Loss, schedule: Schedule, monitor: Monitor) -> NDA
         float32 (step,): the mean loss of each step, before its update.
 
     Raises:
-        StageError: if the loss is not finite.
+        StageError: if the loss or its gradient is not finite.
     """
     keep_freed_memory()
     parameters = list(net.parameters())
@@ -100,10 +100,16 @@ def _update(
     clip: float,
     rate: float,
 ) -> None:
-    """Move the parameters by one step."""
+    """Move the parameters by one step.
+
+    Raises:
+        StageError: if the gradient is not finite, which no optimiser could use.
+    """
     for parameter, gradient in zip(parameters, gradients, strict=True):
         parameter.grad = gradient
-    nn.utils.clip_grad_norm_(parameters, clip)
+    norm = float(nn.utils.clip_grad_norm_(parameters, clip))
+    if not np.isfinite(norm):
+        raise StageError(f"the gradient's norm is {norm}: lower the learning rate or look at the samples")
     for optimiser in optimisers:
         optimiser.param_groups[0]["lr"] = rate
         optimiser.step()

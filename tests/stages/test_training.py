@@ -191,6 +191,23 @@ def test_a_loss_that_is_not_finite_is_refused(value: float) -> None:
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("optimiser", ["muon", "adam"])
+def test_a_gradient_that_is_not_finite_is_refused(optimiser: str) -> None:
+    net = Toy()
+
+    def loss(step: int, shard: int) -> Tensor:
+        return net.middle.weight.sum().mul(0).sqrt()  # 0, with a slope that is not a number
+
+    with pytest.raises(StageError, match="the gradient's norm is nan") as error:
+        fit(
+            net,
+            lambda step, shard: loss(step, shard) + toy_loss(net)(step, shard),
+            Schedule(steps=2, optimiser=optimiser),
+            Silent(),
+        )
+    assert "\n" not in str(error.value)
+
+
 def test_the_gradient_of_a_step_is_the_mean_of_its_shards() -> None:
     net = Toy(8)
     parts = [torch.autograd.grad(toy_loss(net)(0, shard), list(net.parameters())) for shard in range(SHARDS)]
