@@ -13,10 +13,11 @@ import typer
 
 from benchmarks.harness import PAIRS, compare, report
 from datasets import open_dataset
-from stages.matching.declaration import Form, MatchingSamplesParams
+from stages.matching.declaration import Form, MatchingNetParams, MatchingSamplesParams
 from stages.matching.net import MatchingNet
 from stages.matching.samples import draw_samples
 from stages.matching.train import IGNORED, crops_loss, cut_crop
+from stages.optimiser import optimisers_of
 from stages.parameters import initialise
 from stages.training import one_thread
 from stages.transforms.channels import channels
@@ -36,14 +37,15 @@ def trainer(form: Form, batch: int) -> tuple[Callable[[], None], int]:
     samples = draw_samples(params, {"truth": [truth | _no_right_truth(scene.truth.disparity.shape)]})
     net = MatchingNet(3).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     initialise(net, 0)
-    optimiser = torch.optim.Adam(net.parameters(), 1e-3)
+    optimisers = optimisers_of(net, MatchingNetParams())
     rng = np.random.default_rng(0)
 
     def step() -> None:
         crops = [cut_crop(samples, index, views, 0.0, rng) for index in range(batch)]
-        optimiser.zero_grad()
+        net.zero_grad()
         crops_loss(net, crops, 0.0).backward()
-        optimiser.step()
+        for optimiser in optimisers:
+            optimiser.step()
 
     labels = [cut_crop(samples, index, views, 0.0, rng).labels for index in range(batch)]
     return step, sum(int((each != IGNORED).sum()) for each in labels)
