@@ -30,7 +30,7 @@ from stages.matching.declaration import CostVolumeParams
 from stages.matching.net import net_from_parameters
 from stages.metrics import raw_bad
 from stages.precision import resolve
-from stages.training import one_thread
+from stages.threads import one_thread
 from stages.transforms.channels import channels
 from stages.transforms.gray import to_gray
 

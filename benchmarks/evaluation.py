@@ -12,7 +12,7 @@ from stages.evaluation.confidence import confidence
 from stages.evaluation.declaration import PATCH
 from stages.evaluation.net import EvaluationNet
 from stages.parameters import initialise
-from stages.training import one_thread
+from stages.threads import one_thread
 
 SIZE = (128, 192)
 PATCHES = 64

@@ -24,7 +24,7 @@ from stages.disparity import winner_take_all
 from stages.matching.declaration import COST_VOLUME, CostVolumeParams, Mode
 from stages.metrics import raw_bad
 from stages.precision import resolve
-from stages.training import one_thread
+from stages.threads import one_thread
 from stages.transforms.channels import channels
 
 MODES: tuple[Mode, Mode] = ("guided", "exact")

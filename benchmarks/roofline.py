@@ -18,7 +18,7 @@ from benchmarks.harness import PAIRS, Ratio, report, timed
 from pipeline.api import Task, run
 from stages.matching.cost_volume import valid_columns
 from stages.precision import fast_bfloat16
-from stages.training import one_thread
+from stages.threads import one_thread
 
 HEIGHT, WIDTH, DISPARITIES = 128, 256, 40
 SCENE = f"synthetic:train=0,test=1,height={HEIGHT},width={WIDTH},disparities={DISPARITIES}"

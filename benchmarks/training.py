@@ -19,7 +19,7 @@ from stages.matching.samples import draw_samples
 from stages.matching.train import IGNORED, crops_loss, cut_crop
 from stages.optimiser import optimisers_of
 from stages.parameters import initialise
-from stages.training import one_thread
+from stages.threads import one_thread
 from stages.transforms.channels import channels
 
 SCENE = "synthetic:train=0,test=1,height=128,width=192,disparities=40"

@@ -21,6 +21,7 @@ from stages.allocator import keep_freed_memory
 from stages.optimiser import optimisers_of
 from stages.schedule import SHARDS, Schedule
 from stages.stage import Monitor, StageError
+from stages.threads import one_thread
 
 Loss = Callable[[int, int], Tensor]
 """``loss(step, shard)``: the scalar loss of one shard of one step, a pure function of the two numbers."""
@@ -35,11 +36,6 @@ def balanced_cross_entropy(logits: Tensor, labels: Tensor) -> Tensor:
     """
     counts = torch.stack([(labels == label).sum() for label in (0, 1)]).clamp(min=1)
     return functional.cross_entropy(logits.float().T, labels, 0.5 / counts, ignore_index=-1, reduction="sum")
-
-
-def one_thread() -> None:
-    """Make torch use one thread an operation in the calling thread."""
-    torch.set_num_threads(1)
 
 
 def fit(net: nn.Module, loss: Loss, schedule: Schedule, monitor: Monitor) -> NDArray[np.float32]:

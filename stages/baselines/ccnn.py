@@ -16,7 +16,8 @@ from stages.evaluation.samples import UNKNOWN
 from stages.parameters import from_vector, initialise, to_vector
 from stages.schedule import SHARDS
 from stages.stage import Arrays, Inputs, Monitor, NoParams, Silent
-from stages.training import balanced_cross_entropy, fit, one_thread
+from stages.threads import one_thread
+from stages.training import balanced_cross_entropy, fit
 
 
 class Ccnn(nn.Module):

@@ -12,7 +12,7 @@ from stages.evaluation.net import EvaluationNet
 from stages.parameters import from_vector
 from stages.precision import Precision, autocast
 from stages.stage import Array, Inputs, require_shape
-from stages.training import one_thread
+from stages.threads import one_thread
 
 
 def confidence(

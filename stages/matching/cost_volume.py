@@ -22,7 +22,7 @@ from stages.matching.transformed import TransformedNet, is_transformable, run_bl
 from stages.matching.winograd import TILE
 from stages.precision import Precision, autocast
 from stages.stage import Inputs, require_shape
-from stages.training import one_thread
+from stages.threads import one_thread
 
 ROWS, COLUMNS = 32, 64
 """Cells computed at once: few enough for all that is in between to stay in the processor's cache."""

@@ -19,7 +19,7 @@ from stages.matching.sparse import BATCH, judge_tiles
 from stages.matching.winograd import TILE
 from stages.precision import Precision, autocast
 from stages.stage import require_shape
-from stages.training import one_thread
+from stages.threads import one_thread
 
 COLUMNS = 64
 """Columns of tiles gone through at all disparities before the next: what they meet in the views stays in the cache."""

@@ -224,6 +224,12 @@ def test_a_step_of_the_split_takes_one_input_a_scene() -> None:
     assert isinstance(recipe.inputs["evaluation_samples"], str)
 
 
+@pytest.mark.parametrize("product", ["costvolume", "confidence"])
+def test_what_networks_say_does_not_depend_on_the_code_that_trains_them(product: str) -> None:
+    step = find(graph(upto=product, dataset=DATASET.select(["test-0"])), product)
+    assert not {"stages.training", "stages.optimiser"} & set(step.code)
+
+
 def test_the_order_of_training_scenes_is_part_of_the_key() -> None:
     forward, backward = training_scenes(DATASET), training_scenes(DATASET)[::-1]
     ids = [
