@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test lint train calibration bench faults wheel clean
+.PHONY: demo test lint train descriptors calibration bench faults wheel clean
 
 demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
 	$(BIN)/pipeline run motorcycle --output demo
@@ -21,6 +21,11 @@ train: $(READY)  ## DATA=DIR: train both networks on DIR/2001, 2003, 2005 and 20
 	@test -n "$(DATA)" || { echo "make train: say where the Middlebury sets are: make train DATA=DIR"; exit 2; }
 	$(BIN)/pipeline run middlebury:$(DATA) --train --upto evaluation_net --output build/weights
 	cp build/weights/*.safetensors stages/weights/
+
+descriptors: $(READY)  ## DATA=DIR: train the network of fast volumes on the same scenes, and put its weights in place
+	@test -n "$(DATA)" || { echo "make descriptors: say where the Middlebury sets are: make descriptors DATA=DIR"; exit 2; }
+	$(BIN)/pipeline run middlebury:$(DATA) --train --upto descriptor_net --output build/weights
+	cp build/weights/descriptor_net.safetensors stages/weights/
 
 calibration: $(READY)  ## DATA=DIR: measure on the same scenes what the confidence is worth, and put the table in place
 	@test -n "$(DATA)" || { echo "make calibration: say where the Middlebury sets are: make calibration DATA=DIR"; exit 2; }

@@ -1,8 +1,9 @@
-"""The exact cost volume against MC-CNN accurate, and beside fast matchers: ``python -m benchmarks.cost_volume``.
+"""The cost volume against MC-CNN, accurate and fast: ``python -m benchmarks.cost_volume``.
 
-The first figure is a ratio of the time from two views to their volume, on the same crop of Motorcycle, one thread on
-both sides. The table below it has, on some rows of the scene, the time and the raw error (> 1 px, nonocc, what is not
-reported counted wrong) of this project, MC-CNN fast with each of its back ends, and OpenCV's SGBM; and a picture.
+The first figure is the ratio of the time from two views to their exact volume, on the same crop of Motorcycle, one
+thread on both sides; the second that of the time to the raw map of a fast volume, on some rows of the scene. The table
+below them has, on these rows, the time and the raw error (> 1 px, nonocc, what is not reported counted wrong) of this
+project, MC-CNN fast with each of its back ends, and OpenCV's SGBM; and a picture.
 """
 
 import sys
@@ -18,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.guided import Side
-from benchmarks.harness import FOLDER, PAIRS, Ratio, median_seconds, report, timed, write
+from benchmarks.harness import FOLDER, PAIRS, Ratio, compare, median_seconds, report, timed, write
 from benchmarks.peers import AccurateMatcher, PeerError
 from datasets import Scene, open_dataset
 from pipeline.shipped import read_shipped_weights
@@ -27,6 +28,8 @@ from stages.baselines.sgm import match_semi_global
 from stages.disparity import winner_take_all
 from stages.matching.cost_volume import cost_volume
 from stages.matching.declaration import CostVolumeParams
+from stages.matching.descriptor_net import descriptor_net_from_parameters
+from stages.matching.fast import fast_cost_volume
 from stages.matching.net import net_from_parameters
 from stages.metrics import raw_bad
 from stages.precision import resolve
@@ -34,6 +37,8 @@ from stages.threads import one_thread
 from stages.transforms.channels import channels
 from stages.transforms.gray import to_gray
 
+FASTEST = "MC-CNN fast, onnx dw"
+"""The quickest form of MC-CNN fast."""
 PICTURE = Path("docs/pictures/matchers.png")
 Map = Callable[[], NDArray[np.float32]]
 
@@ -53,7 +58,13 @@ def main(
     one_thread()
     scene = open_dataset("motorcycle").scenes[0].load()
     ratios = list(_against_accurate(scene, crop, pairs)) if install else []
-    matchers = _matchers(scene, rows, pairs)
+    first = (scene.left.shape[0] - rows) // 2
+    part = slice(first, first + rows)
+    maps = _maps(scene, part)
+    if FASTEST in maps:
+        what = "fast cost volume and raw map, times MC-CNN fast (mccnn 1.4.1, ONNX)"
+        ratios.append(compare(what, maps["this project, fast"], maps[FASTEST], 1, pairs=pairs))
+    matchers = _measured(scene, part, maps, pairs)
     report("cost_volume", ratios)
     write("matchers", {"rows": rows, "matchers": matchers})
     table = Table("matcher", "seconds", "raw error, %", box=None)
@@ -76,6 +87,11 @@ def _guided_volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparitie
     return side.volume
 
 
+def _fast_volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float32]:
+    net = descriptor_net_from_parameters(read_shipped_weights("descriptor_net", {})["parameters"], 3)
+    return fast_cost_volume(net, channels(left, right), disparities)
+
+
 def _against_accurate(scene: Scene, crop: tuple[int, int, int], pairs: int) -> list[Ratio]:
     """Return the ratio to MC-CNN accurate; where that cannot be had, say so and return none."""
     height, width, count = crop
@@ -95,20 +111,23 @@ def _against_accurate(scene: Scene, crop: tuple[int, int, int], pairs: int) -> l
     return [Ratio(what, tuple(other / one for one, other in times), 10, seconds=seconds)]
 
 
-def _matchers(scene: Scene, rows: int, pairs: int) -> dict[str, dict[str, float]]:
-    """Return time and raw error of each matcher on the rows in the middle of the scene."""
-    first = (scene.left.shape[0] - rows) // 2
-    part = slice(first, first + rows)
+def _maps(scene: Scene, part: slice) -> dict[str, Map]:
+    """Return what makes the raw map of some rows of the scene, by matcher."""
     left, right = scene.left[part], scene.right[part]
     gray = to_gray(left), to_gray(right)
     disparities = range(scene.disparities.minimum, scene.disparities.maximum + 1)
     sgm = SgmParams(d_min=disparities[0], d_max=disparities[-1])
-    maps: dict[str, Map] = {
+    return {
         "this project, exact": lambda: winner_take_all(_volume(left, right, disparities), disparities[0]),
         "this project, guided": lambda: winner_take_all(_guided_volume(left, right, disparities), disparities[0]),
+        "this project, fast": lambda: winner_take_all(_fast_volume(left, right, disparities), disparities[0]),
         **_fast_matchers(gray, disparities),
         "OpenCV SGBM, checked": lambda: match_semi_global(*gray, sgm, checked=True),
     }
+
+
+def _measured(scene: Scene, part: slice, maps: dict[str, Map], pairs: int) -> dict[str, dict[str, float]]:
+    """Return time and raw error of each matcher."""
     if scene.truth is None:
         raise typer.BadParameter("the scene has no ground truth")
     truth, mask = scene.truth.disparity[part], scene.truth.nonocc[part]

@@ -13,10 +13,11 @@ import typer
 
 from benchmarks.harness import PAIRS, compare, report
 from datasets import open_dataset
+from stages.matching.crops import IGNORED, cut_crop
 from stages.matching.declaration import Form, MatchingNetParams, MatchingSamplesParams
 from stages.matching.net import MatchingNet
 from stages.matching.samples import draw_samples
-from stages.matching.train import IGNORED, crops_loss, cut_crop
+from stages.matching.train import crops_loss
 from stages.optimiser import optimisers_of
 from stages.parameters import initialise
 from stages.threads import one_thread

@@ -26,7 +26,7 @@ from stages.evaluation.calibration_declaration import CalibrationParams
 from stages.evaluation.declaration import ConfidenceParams, EvaluationNetParams, EvaluationSamplesParams
 from stages.filtering import SemidenseParams
 from stages.finishing.declaration import RefinedParams
-from stages.matching.declaration import CostVolumeParams, MatchingNetParams, MatchingSamplesParams
+from stages.matching.declaration import CostVolumeParams, DescriptorNetParams, MatchingNetParams, MatchingSamplesParams
 from stages.stage import NoParams, Params
 from stages.transforms.declaration import ChannelsParams
 
@@ -48,6 +48,7 @@ class Config(BaseModel):
     channels: ChannelsParams = ChannelsParams()
     matching_samples: MatchingSamplesParams = MatchingSamplesParams()
     matching_net: MatchingNetParams = MatchingNetParams()
+    descriptor_net: DescriptorNetParams = DescriptorNetParams()
     costvolume: CostVolumeParams = CostVolumeParams()
     disparity: DisparityParams = DisparityParams()
     evaluation_samples: EvaluationSamplesParams = EvaluationSamplesParams()

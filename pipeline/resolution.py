@@ -37,14 +37,14 @@ def _require_within(params: Params, scene: SceneSource) -> None:
             raise UsageError(f"{scene.name}: {name} is {value} px, but the image is only {width} px wide")
 
 
-def require_trainable(config: Config) -> None:
+def require_trainable(config: Config, product: str) -> None:
     """Refuse to train with another light on the gray channel where there is none: it would fall on another channel.
 
     Raises:
-        UsageError: if ``matching_net.relight`` is on and ``channels.use`` leaves gray out.
+        UsageError: if the product's ``relight`` is on and ``channels.use`` leaves gray out.
     """
-    if config.matching_net.relight and "gray" not in config.channels.use:
+    if getattr(config.section(product), "relight", 0) and "gray" not in config.channels.use:
         raise UsageError(
-            "matching_net.relight changes the light of the gray channel, which channels.use leaves out: "
-            "set matching_net.relight=0"
+            f"{product}.relight changes the light of the gray channel, which channels.use leaves out: "
+            f"set {product}.relight=0"
         )

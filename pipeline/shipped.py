@@ -16,7 +16,7 @@ WEIGHTS = {
         compute=f"pipeline.shipped:read_shipped_{'table' if product == 'calibration' else 'weights'}",
     )
     for product, stage in STAGES.items()
-    if product in ("matching_net", "evaluation_net", "calibration")
+    if product in ("matching_net", "descriptor_net", "evaluation_net", "calibration")
 }
 _HOW = {
     "calibration": "no calibration comes with this installation: a wanted error and calibrated probabilities need one; "

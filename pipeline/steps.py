@@ -23,7 +23,8 @@ from stages.catalog import CATALOG, STAGES
 from stages.stage import Stage
 
 PACKAGES = ("pipeline", "stages", "datasets", "cache")
-NETS = ("matching_net", "evaluation_net")
+NETS = ("matching_net", "descriptor_net", "evaluation_net")
+"""Products that are networks."""
 LEARNT = tuple(shipped.WEIGHTS)
 """Products that come with the package, unless one trains."""
 CROSS_FITTED = ("evaluation_samples", "evaluation_net")
@@ -153,8 +154,6 @@ def build(request: Request) -> Graph:
     graph = Graph(notes=list(request.notes))
     trained_on = [scene.image_identity() for scene in request.training if request.leave_out]
     for variant, config in request.configs.items():
-        if request.train:
-            require_trainable(config)
         builder = _Builder(graph, config, request)
         graph.targets += [(step_id, variant) for step_id in _targets(builder, trained_on)]
     # The order of the products is one in which each comes after its inputs, whichever scenes they belong to.
@@ -231,6 +230,8 @@ class _Builder:
         if product == "calibration":
             return self._calibration()
         stage = STAGES[product]
+        if "channels" in stage.inputs:
+            require_trainable(self.config, product)
         needed = getattr(self.config.section(product), "inputs", stage.inputs)
         inputs = {name: self._inputs(stage, name, scene) for name in stage.inputs if name in needed}
         return self._add_stage(stage, scene, inputs)

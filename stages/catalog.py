@@ -10,7 +10,7 @@ from stages.evaluation.calibration_declaration import CALIBRATED_CONFIDENCE, CAL
 from stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
 from stages.filtering import SEMIDENSE
 from stages.finishing.declaration import FILLED, REFINED, RIGHT_DISPARITY
-from stages.matching.declaration import COST_VOLUME, MATCHING_NET, MATCHING_SAMPLES
+from stages.matching.declaration import COST_VOLUME, DESCRIPTOR_NET, MATCHING_NET, MATCHING_SAMPLES
 from stages.metrics import METRICS
 from stages.stage import Stage
 from stages.survey import SURVEY
@@ -21,6 +21,7 @@ CATALOG: tuple[Stage, ...] = (
     CHANNELS,
     MATCHING_SAMPLES,
     MATCHING_NET,
+    DESCRIPTOR_NET,
     COST_VOLUME,
     DISPARITY,
     RIGHT_DISPARITY,

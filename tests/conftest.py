@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.tiny import SETTINGS, SPEC
+from tests.tiny import NETS, SETTINGS, SPEC
 
 if TYPE_CHECKING:  # the package is imported when it is used: most tests do without torch
     from pipeline.api import Result, Task
@@ -69,7 +69,7 @@ def weights(trained: "Result", tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
     folder = tmp_path / "weights"
     folder.mkdir()
-    for product in ("matching_net", "evaluation_net"):
+    for product in NETS:
         dataset = trained.open(product)
         arrays = {name: dataset[name].values for name in ("parameters", "loss")}
         (folder / f"{product}.safetensors").write_bytes(save_weights(product, arrays, {}))

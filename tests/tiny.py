@@ -11,6 +11,8 @@ def _above(product: str) -> set[str]:
 
 PATH = _above("metrics")
 """The products of a whole run; others are made on demand."""
+NETS = ("matching_net", "evaluation_net")
+"""Its networks."""
 SPEC = "synthetic:train=2,test=1,height=64,width=80,disparities=8"
 SETTINGS = (
     "matching_samples.samples=8",
@@ -18,6 +20,8 @@ SETTINGS = (
     "matching_samples.width=16",
     "matching_net.steps=2",
     "matching_net.batch=2",
+    "descriptor_net.steps=2",
+    "descriptor_net.batch=2",
     "evaluation_samples.samples=8",
     "evaluation_samples.rows=2",
     "evaluation_samples.columns=2",

@@ -11,7 +11,7 @@ from pipeline.errors import UsageError
 from pipeline.lineage import lineage
 from pipeline.plan import Plan, Planned
 from pipeline.reporting.baselines import cached_baselines, compared_rows
-from pipeline.steps import SPLIT
+from pipeline.steps import NETS, SPLIT
 from pipeline.tasks import read_arrays
 from pipeline.views.scene_maps import SceneMaps
 from stages.metrics import metric_rows
@@ -93,10 +93,8 @@ class Gathered:
 
     @cached_property
     def networks(self) -> dict[str, Planned]:
-        """The steps of the two networks that are cached."""
-        return {
-            each.step.product: each for each in self.hits if each.step.product in ("matching_net", "evaluation_net")
-        }
+        """The steps of the networks that are cached."""
+        return {each.step.product: each for each in self.hits if each.step.product in NETS}
 
     @property
     def rows(self) -> list[dict[str, Any]]:

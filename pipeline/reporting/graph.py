@@ -6,7 +6,7 @@ from typing import NamedTuple
 from pipeline.cachetools import bytes_text
 from pipeline.markup import Html, table, tag, text
 from pipeline.reporting.gathered import Gathered
-from pipeline.steps import ALL_PRODUCTS
+from pipeline.steps import ALL_PRODUCTS, NETS
 from stages.catalog import STAGES
 
 _PLACES = {
@@ -19,11 +19,12 @@ _PLACES = {
     "metrics": (6, 0),
     "matching_samples": (0, 1),
     "matching_net": (1, 1),
+    "descriptor_net": (1, 1),
     "evaluation_samples": (3, 1),
     "evaluation_net": (4, 1),
     "truth": (6, 1),
 }
-"""Column and row of each product."""
+"""Column and row of each product; a volume is made by one of the two networks that share a place."""
 _WIDTH, _HEIGHT, _GAP_X, _GAP_Y = 124, 56, 34, 54
 
 
@@ -98,11 +99,14 @@ def _drawn_inputs(product: str, counts: Mapping[str, Done]) -> list[str]:
     """Return the inputs that get an arrow: those between neighbours; the long ones go without saying."""
     x, y = _PLACES[product]
     inputs = [name for name in STAGES[product].inputs if name in _PLACES] if product in STAGES else []
-    if product.endswith("_net") and f"{product.removesuffix('_net')}_samples" not in counts:
+    if product in NETS and not any(name in counts for name in inputs if name.endswith("_samples")):
         return []
     return [
-        name for name in inputs if name in counts and abs(_PLACES[name][0] - x) + abs(_PLACES[name][1] - y) == 1
-    ] + [name for name in inputs if name == "matching_net" and product == "costvolume"]
+        name
+        for name in inputs
+        if name in counts
+        and (abs(_PLACES[name][0] - x) + abs(_PLACES[name][1] - y) == 1 or (name in NETS and product == "costvolume"))
+    ]
 
 
 def _corner(product: str) -> tuple[int, int]:

@@ -16,6 +16,8 @@ from torch.nn import functional
 
 from stages.allocator import keep_freed_memory
 from stages.matching.declaration import RADIUS, CostVolumeParams
+from stages.matching.descriptor_net import descriptor_net_from_parameters
+from stages.matching.fast import padded_fast_costs
 from stages.matching.guided import padded_guided_costs
 from stages.matching.net import SIDES, MatchingNet, net_from_parameters, require_views
 from stages.matching.transformed import TransformedNet, is_transformable, run_blocks
@@ -131,10 +133,15 @@ def _transformed(net: MatchingNet, views: Tensor) -> Costs:
 
 def compute_costs(params: CostVolumeParams, inputs: Inputs) -> dict[str, NDArray[np.generic]]:
     """Return one tile of the volume: ``cost`` float16 (y, x, d) and its coordinate ``d`` int16."""
+    return {"cost": _costs(params, inputs).astype(np.float16), "d": np.array(params.disparities, np.int16)}
+
+
+def _costs(params: CostVolumeParams, inputs: Inputs) -> NDArray[np.float32]:
     channels = inputs["channels"]["channels"]
+    if params.mode == "fast":
+        descriptor_net = descriptor_net_from_parameters(inputs["descriptor_net"]["parameters"], channels.shape[1])
+        return padded_fast_costs(descriptor_net, channels, params.disparities, params.precision)
     net = net_from_parameters(inputs["matching_net"]["parameters"], channels.shape[1])
     if params.mode == "guided":
-        costs = padded_guided_costs(net, channels, params.disparities, params.window, params.votes, params.precision)
-    else:
-        costs = padded_cost_volume(net, channels, params.disparities, params.precision)
-    return {"cost": costs.astype(np.float16), "d": np.array(params.disparities, np.int16)}
+        return padded_guided_costs(net, channels, params.disparities, params.window, params.votes, params.precision)
+    return padded_cost_volume(net, channels, params.disparities, params.precision)

@@ -1,4 +1,4 @@
-"""What the matching-Net's three products are made from, and what can be set. Light: it does not load torch."""
+"""What the products up to the cost volume are made from, and what can be set. Light: it does not load torch."""
 
 from typing import Any, Literal
 
@@ -10,10 +10,14 @@ from stages.stage import Output, Params, Stage, StageError
 
 Form = Literal["dense", "patch"]
 Head = Literal["compact", "paper"]
-Mode = Literal["exact", "guided"]
+Mode = Literal["exact", "guided", "fast"]
 PATCH = 11
 """Side of the square patch that one answer of the matching-Net depends on, in pixels."""
 RADIUS = PATCH // 2
+DILATIONS = (1, 1, 2, 4)
+"""Distance of the taps of each of the descriptor-Net's kernels, px."""
+REACH = sum(DILATIONS)
+"""Pixels that a descriptor looks away from its own."""
 CENSUS = (7, 9)
 """Rows and columns of the signatures that propose cells to a guided volume."""
 MARGIN = 4 + CENSUS[1] // 2
@@ -56,20 +60,40 @@ class MatchingNetParams(Schedule):
     seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
 
 
+class DescriptorNetParams(Schedule):
+    """The descriptor-Net of a fast volume and how it is trained."""
+
+    steps: int = Field(4500, ge=1, description="optimiser steps")
+    batch: int = Field(
+        8, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"
+    )
+    ranking: float = Field(4.0, ge=0, description="weight of the ranking loss; 0: none")
+    relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting a view; 0: none")
+    precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
+    seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
+
+
 class CostVolumeParams(Params):
     """Which cells are computed, and in which arithmetic."""
 
     d_min: int | None = Field(None, description="smallest disparity, px; default: the scene's own")
     d_max: int | None = Field(None, description="largest disparity, px; default: the scene's own")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
-    mode: Mode = Field("exact", description="every cell, or those alone that a cheap matching proposes")
+    mode: Mode = Field(
+        "exact", description="every cell, those alone that a cheap matching proposes, or products of descriptors"
+    )
     window: int = Field(7, ge=1, le=31, description="side of the window that proposals are matched over, px, odd")
     votes: int = Field(6, ge=1, le=144, description="pixels a proposal needs, of 144 in and around a tile")
 
     @property
     def context(self) -> int:
         """Pixels that a cell looks away from its own."""
-        return RADIUS if self.mode == "exact" else MARGIN + self.window // 2
+        return {"exact": RADIUS, "guided": MARGIN + self.window // 2, "fast": REACH}[self.mode]
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The products that the mode needs."""
+        return ("channels", "descriptor_net" if self.mode == "fast" else "matching_net")
 
     @property
     def disparities(self) -> range:
@@ -92,12 +116,13 @@ class CostVolumeParams(Params):
 
     @model_serializer(mode="wrap")
     def _that_matter(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what an exact volume does not depend on: it is in no key of one."""
+        """Leave out what the volume does not depend on: it is in no key of one."""
         fields: dict[str, Any] = dump(self)
-        return {name: value for name, value in fields.items() if self.mode != "exact" or name not in _GUIDING}
+        return {name: value for name, value in fields.items() if name not in _WITHOUT[self.mode]}
 
 
-_GUIDING = ("mode", "window", "votes")
+_WITHOUT = {"exact": ("mode", "window", "votes"), "guided": (), "fast": ("window", "votes")}
+"""The settings that a volume of each mode does not depend on."""
 
 MATCHING_SAMPLES = Stage(
     product="matching_samples",
@@ -130,9 +155,22 @@ MATCHING_NET = Stage(
     monitored=True,
 )
 
+DESCRIPTOR_NET = Stage(
+    product="descriptor_net",
+    inputs=("matching_samples", "channels"),
+    outputs=(
+        Output("parameters", ("parameter",), "float32", "1", "weights and channel scales of the descriptor-Net"),
+        Output("loss", ("step",), "float32", "1", "loss of each training step"),
+    ),
+    compute="stages.matching.descriptor_training:train_descriptor_net",
+    params=DescriptorNetParams,
+    scope="split",
+    monitored=True,
+)
+
 COST_VOLUME = Stage(
     product="costvolume",
-    inputs=("channels", "matching_net"),
+    inputs=("channels", "matching_net", "descriptor_net"),
     outputs=(
         Output("cost", ("y", "x", "d"), "float16", "1", "log-odds of a mismatch; lower is better", {"x": 256}),
         Output("d", ("d",), "int16", "px", "disparity: x_right = x_left - d"),

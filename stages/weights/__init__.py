@@ -18,6 +18,7 @@ from safetensors.torch import save as save_tensors
 from torch import nn
 
 from stages.evaluation.net import EvaluationNet
+from stages.matching.descriptor_net import DescriptorNet
 from stages.matching.net import HEADS, MatchingNet
 from stages.parameters import count, from_vector, to_vector
 from stages.stage import Arrays, StageError
@@ -39,14 +40,16 @@ def candidates(product: str) -> list[nn.Module]:
         return [EvaluationNet()]
     if product == "matching_net":
         return [MatchingNet(channels, head) for head in HEADS for channels in range(1, MOST_CHANNELS + 1)]
-    raise StageError(f"{product} is no network: weights are those of matching_net or evaluation_net")
+    if product == "descriptor_net":
+        return [DescriptorNet(channels) for channels in range(1, MOST_CHANNELS + 1)]
+    raise StageError(f"{product} is no network: weights are those of matching_net, descriptor_net or evaluation_net")
 
 
 def save_weights(product: str, arrays: Arrays, metadata: Mapping[str, Any]) -> bytes:
     """Return a trained network as a safetensors file.
 
     Args:
-        product: ``matching_net`` or ``evaluation_net``.
+        product: ``matching_net``, ``descriptor_net`` or ``evaluation_net``.
         arrays: those of the product: ``parameters`` float32 (parameter,) and ``loss`` float32 (step,).
         metadata: JSON that says how they were made, such as the training configuration.
 

@@ -19,11 +19,12 @@ from pipeline.errors import UsageError
 from pipeline.exporter import COLUMNS, export, writable_folder, write_rows
 from pipeline.plan import Plan
 from pipeline.sources import IMAGES, TRUTH
-from pipeline.steps import NETS, SPLIT, Step
+from pipeline.steps import SPLIT, Step
 from pipeline.tasks import Made
 from pipeline.views.colours import confidence_rgb, disparity_rgb
 from stages.catalog import STAGES
 from stages.stage import Stage
+from tests.tiny import NETS
 
 N = np.nan
 RAW = np.array([[10, 20, N], [30, 40, 50]], np.float32)

@@ -7,9 +7,8 @@ import pytest
 
 from pipeline import api, shipped
 from pipeline.api import Result, Task
-from pipeline.steps import NETS
 from stages.stage import StageError
-from tests.tiny import TEST_ONLY
+from tests.tiny import NETS, TEST_ONLY
 
 
 def test_missing_weights_say_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -179,6 +179,14 @@ def test_a_guided_volume_is_another_product() -> None:
     assert guided.settings["tiles"] == "32 rows, halo 11, edge"
 
 
+def test_a_fast_volume_is_made_by_the_descriptor_net_alone() -> None:
+    made = graph("costvolume.mode=fast", upto="costvolume")
+    fast = find(made, "costvolume")
+    assert set(fast.inputs) == {"channels", "descriptor_net"} and fast.settings["tiles"] == "32 rows, halo 8, edge"
+    assert "matching_net" not in {step.product for step in made.steps.values()}
+    assert set(find(graph(upto="costvolume"), "costvolume").inputs) == {"channels", "matching_net"}
+
+
 def test_a_range_of_the_user_s_own_wins() -> None:
     settings = find(graph("costvolume.d_min=-2", "costvolume.d_max=3", upto="costvolume"), "costvolume").settings
     assert (settings["d_min"], settings["d_max"]) == (-2, 3)
@@ -268,3 +276,5 @@ def test_no_light_falls_on_other_channels_than_gray() -> None:
     with pytest.raises(UsageError, match="changes the light of the gray channel"):
         graph(without_gray, train=True)
     assert graph(without_gray, "matching_net.relight=0", train=True)
+    with pytest.raises(UsageError, match="set descriptor_net"):
+        graph(without_gray, "matching_net.relight=0", "costvolume.mode=fast", train=True)

@@ -136,6 +136,7 @@ PRODUCTS: dict[str, Callable[[], xr.Dataset]] = {
     "channels": channels,
     "matching_samples": matching_samples,
     "matching_net": network,
+    "descriptor_net": network,
     "costvolume": costvolume,
     "disparity": disparity,
     "evaluation_samples": evaluation_samples,

@@ -3,18 +3,11 @@ import pytest
 import torch
 
 from stages.matching.cost_volume import cost_volume
+from stages.matching.crops import IGNORED, Crop, cut_crop, label_cells, ranking_loss
 from stages.matching.declaration import MATCHING_NET, MatchingNetParams, MatchingSamplesParams
 from stages.matching.net import net_from_parameters
 from stages.matching.samples import draw_samples
-from stages.matching.train import (
-    IGNORED,
-    Crop,
-    crops_loss,
-    cut_crop,
-    label_cells,
-    ranking_loss,
-    train_matching_net,
-)
+from stages.matching.train import crops_loss, train_matching_net
 from tests.stages.matching.reference import literal_logits, patches, random_net, shifted_scene
 from tests.stages.monitors import InterruptedTrainingError, Memory
 

@@ -12,6 +12,7 @@ from safetensors.torch import load, save
 from stages import weights
 from stages.evaluation.net import EvaluationNet
 from stages.matching.declaration import Head
+from stages.matching.descriptor_net import DescriptorNet
 from stages.matching.net import MatchingNet
 from stages.parameters import count, to_vector
 from stages.stage import StageError
@@ -39,6 +40,13 @@ def test_the_round_trip_of_a_matching_net_is_exact(channels: int, head: Head) ->
     again = read_weights("matching_net", save_weights("matching_net", {"parameters": vector, "loss": LOSS}, {}))
     assert all(array.dtype == np.float32 for array in again.values())
     assert np.array_equal(again["parameters"], vector) and np.array_equal(again["loss"], LOSS)
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3])
+def test_the_round_trip_of_a_descriptor_net_is_exact(channels: int) -> None:
+    vector = np.random.default_rng(0).normal(size=count(DescriptorNet(channels))).astype(np.float32)
+    data = save_weights("descriptor_net", {"parameters": vector, "loss": LOSS}, {})
+    assert np.array_equal(read_weights("descriptor_net", data)["parameters"], vector)
 
 
 def test_the_round_trip_of_an_evaluation_net_is_exact() -> None:

@@ -1,0 +1,70 @@
+"""Training the descriptor-Net on the matching-Net's crops, each compared at every disparity of its scene.
+
+A disparity more costs only products of descriptors, so a crop meets all of the scene's range, not the sample's few.
+"""
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from stages.matching.crops import Crop, cells_loss, cut_crop, measure_channels
+from stages.matching.declaration import REACH, DescriptorNetParams
+from stages.matching.descriptor_net import DescriptorNet
+from stages.matching.fast import diagonals
+from stages.matching.samples import ABSENT
+from stages.parameters import initialise, to_vector
+from stages.precision import autocast
+from stages.schedule import SHARDS
+from stages.stage import Arrays, Inputs, Monitor, Silent, by_scene
+from stages.training import fit
+
+
+def train_descriptor_net(
+    params: DescriptorNetParams, inputs: Inputs, monitor: Monitor | None = None
+) -> dict[str, NDArray[np.float32]]:
+    """Train a descriptor-Net from nothing.
+
+    Args:
+        params: schedule and augmentation.
+        inputs: as for ``train_matching_net``.
+        monitor: progress and checkpoints.
+
+    Returns:
+        ``parameters`` float32 (parameter,) and ``loss`` float32 (step,).
+    """
+    scenes = [scene["channels"] for scene in by_scene(inputs, "channels")]
+    net = DescriptorNet(scenes[0].shape[1]).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    initialise(net, params.seed)
+    measure_channels(net, scenes)
+    samples = inputs["matching_samples"]
+    slots = [_range(samples, scene) for scene in range(len(scenes))]
+
+    def loss(step: int, shard: int) -> Tensor:
+        rng = np.random.default_rng((params.seed, step, shard))
+        first = step * params.batch + shard
+        chosen = [index % len(samples["scene"]) for index in range(first, (step + 1) * params.batch, SHARDS)]
+        crops = [
+            cut_crop(samples, index, scenes, params.relight, rng, slots[int(samples["scene"][index])], REACH)
+            for index in chosen
+        ]
+        with autocast(params.precision):
+            logits = [descriptor_logits(net, crop) for crop in crops]
+        return cells_loss(logits, [crop.labels for crop in crops], params.ranking)
+
+    curve = fit(net, loss, params, monitor or Silent())
+    return {"parameters": to_vector(net), "loss": curve}
+
+
+def descriptor_logits(net: DescriptorNet, crop: Crop) -> Tensor:
+    """Return the logits (slot, 2, y, x) of a crop that is compared at consecutive disparities, in ascending order."""
+    left, strip = (net(view)[0].permute(1, 2, 0) for view in (crop.left, crop.strip))
+    mismatch = net.log_odds(diagonals(left @ strip.mT, len(crop.starts))).flip(2).permute(2, 0, 1)
+    return torch.stack([torch.zeros_like(mismatch), mismatch], 1)
+
+
+def _range(samples: Arrays, scene: int) -> NDArray[np.int32]:
+    """Return all disparities from the smallest to the largest that a scene's samples have."""
+    known = samples["disparities"][samples["scene"] == scene]
+    known = known[known != ABSENT]
+    return np.arange(known.min(), known.max() + 1, dtype=np.int32)
