@@ -49,10 +49,14 @@ class DescriptorNet(nn.Module):
 
     def forward(self, view: Tensor) -> Tensor:
         """Return the descriptors of a view: (B, channels, H, W) -> (B, 64, H - 16, W - 16) float32, of unit length."""
-        maps = (view - self.input_mean[:, None, None]) / self.input_std[:, None, None]
+        maps = self.normalised(view)
         for layer in self.hidden:
             maps = functional.relu(layer(maps))
         return functional.normalize(self.out(maps).float(), dim=1)
+
+    def normalised(self, view: Tensor) -> Tensor:
+        """Return the channels of a view as the first layer takes them: (B, channels, H, W), of the same shape."""
+        return (view - self.input_mean[:, None, None]) / self.input_std[:, None, None]
 
     def log_odds(self, products: Tensor) -> Tensor:
         """Return the log-odds of a mismatch from dot products of descriptors, of any shape."""

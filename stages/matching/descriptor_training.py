@@ -3,6 +3,8 @@
 A disparity more costs only products of descriptors, so a crop meets all of the scene's range, not the sample's few.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -13,8 +15,10 @@ from stages.matching.declaration import REACH, DescriptorNetParams
 from stages.matching.descriptor_net import DescriptorNet
 from stages.matching.fast import diagonals
 from stages.matching.samples import ABSENT
+from stages.matching.transformed_descriptor_training import differentiable
+from stages.matching.transformed_descriptors import kernels_of, transformed_descriptors
 from stages.parameters import initialise, to_vector
-from stages.precision import autocast
+from stages.precision import Precision, autocast
 from stages.schedule import SHARDS
 from stages.stage import Arrays, Inputs, Monitor, Silent, by_scene
 from stages.training import fit
@@ -49,16 +53,26 @@ def train_descriptor_net(
             for index in chosen
         ]
         with autocast(params.precision):
-            logits = [descriptor_logits(net, crop) for crop in crops]
+            logits = crops_logits(net, crops, params.precision)
         return cells_loss(logits, [crop.labels for crop in crops], params.ranking)
 
     curve = fit(net, loss, params, monitor or Silent())
     return {"parameters": to_vector(net), "loss": curve}
 
 
-def descriptor_logits(net: DescriptorNet, crop: Crop) -> Tensor:
-    """Return the logits (slot, 2, y, x) of a crop that is compared at consecutive disparities, in ascending order."""
-    left, strip = (net(view)[0].permute(1, 2, 0) for view in (crop.left, crop.strip))
+def crops_logits(net: DescriptorNet, crops: Sequence[Crop], precision: Precision = "float32") -> list[Tensor]:
+    """Return the logits (slot, 2, y, x) of each crop, compared at consecutive disparities, in ascending order."""
+    kernels = kernels_of(net) if precision == "float32" else None
+    return [_logits(net, kernels, crop) for crop in crops]
+
+
+def _logits(net: DescriptorNet, kernels: Sequence[Tensor] | None, crop: Crop) -> Tensor:
+    left, strip = (
+        net(view)[0].permute(1, 2, 0)
+        if kernels is None
+        else transformed_descriptors(net, kernels, view[0], differentiable)
+        for view in (crop.left, crop.strip)
+    )
     mismatch = net.log_odds(diagonals(left @ strip.mT, len(crop.starts))).flip(2).permute(2, 0, 1)
     return torch.stack([torch.zeros_like(mismatch), mismatch], 1)
 

@@ -13,6 +13,7 @@ from torch.nn import functional
 from stages.allocator import keep_freed_memory
 from stages.matching.declaration import REACH
 from stages.matching.descriptor_net import DescriptorNet
+from stages.matching.transformed_descriptors import kernels_of, transformed_descriptors
 from stages.precision import Precision, autocast
 from stages.stage import StageError, require_shape
 from stages.threads import one_thread
@@ -71,6 +72,8 @@ def padded_fast_costs(
 
 def _descriptors(net: DescriptorNet, view: NDArray[np.float32], precision: Precision) -> Tensor:
     """Return the descriptors of a padded view: (y, x, number)."""
+    if precision == "float32":
+        return transformed_descriptors(net, kernels_of(net), torch.from_numpy(np.ascontiguousarray(view)))
     image = torch.from_numpy(np.ascontiguousarray(view))[None].contiguous(memory_format=torch.channels_last)
     with autocast(precision):
         made: Tensor = net(image)

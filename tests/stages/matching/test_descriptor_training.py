@@ -4,7 +4,7 @@ import pytest
 from stages.matching.crops import cut_crop
 from stages.matching.declaration import DESCRIPTOR_NET, REACH, DescriptorNetParams, MatchingSamplesParams
 from stages.matching.descriptor_net import descriptor_net_from_parameters
-from stages.matching.descriptor_training import descriptor_logits, train_descriptor_net
+from stages.matching.descriptor_training import crops_logits, train_descriptor_net
 from stages.matching.fast import fast_cost_volume
 from stages.matching.samples import draw_samples
 from tests.stages.matching.reference import shifted_scene
@@ -31,7 +31,7 @@ def test_a_crop_gives_the_cells_of_the_volume() -> None:
     }  # fmt: skip
     slots = np.arange(-2, 6, dtype=np.int32)
     crop = cut_crop(samples, 0, [views], 0.0, np.random.default_rng(0), slots, REACH)
-    logits = descriptor_logits(net, crop)
+    (logits,) = crops_logits(net, [crop])
     costs = fast_cost_volume(net, views, range(-2, 6))[12:16, 30:36]
     assert logits.shape == (8, 2, 4, 6)
     assert np.allclose((logits[:, 1] - logits[:, 0]).permute(1, 2, 0), costs, atol=1e-4)
@@ -41,8 +41,8 @@ def test_a_crop_gives_the_cells_of_the_volume() -> None:
 def test_every_disparity_of_the_scene_is_met(monkeypatch: pytest.MonkeyPatch) -> None:
     met = []
     monkeypatch.setattr(
-        "stages.matching.descriptor_training.descriptor_logits",
-        lambda net, crop: met.append(len(crop.starts)) or descriptor_logits(net, crop),
+        "stages.matching.descriptor_training.crops_logits",
+        lambda net, crops, precision: met.extend(len(crop.starts) for crop in crops) or crops_logits(net, crops),
     )
     scene = shifted_scene()
     train_descriptor_net(settings(steps=1), inputs(scene, samples=60))
