@@ -1,15 +1,15 @@
 """What other ways of training do on scenes held out: ``python -m benchmarks.recipe DATASET --variant SETTINGS``.
 
-A matching-Net is trained anew for each variant, on the training scenes but those held out and their siblings, and its
-raw maps are judged on rows in the middle of the held-out scenes. So settings are chosen without a look at the scenes
-of the final figures. To compare at equal cost, give each variant the steps that take as long; the table says how long
-they took.
+The network of each variant's cost volume (the descriptor-Net with ``costvolume.mode=fast``) is trained anew on the
+training scenes but those held out and their siblings, and the raw maps are judged on rows in the middle of the held-out
+scenes. So settings are chosen without a look at the scenes of the final figures. To compare at equal cost, give each
+variant the steps that take as long; the table says how long they took.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast
 
 import numpy as np
 import typer
@@ -25,9 +25,8 @@ from pipeline.progress import ProgressWatch
 from pipeline.steps import Request
 from pipeline.training_split import families, training_scenes
 from stages.disparity import winner_take_all
-from stages.matching.cost_volume import padded_cost_volume
-from stages.matching.declaration import RADIUS
-from stages.matching.net import net_from_parameters
+from stages.matching.cost_volume import compute_costs
+from stages.matching.declaration import CostVolumeParams
 from stages.metrics import raw_bad
 from stages.precision import resolve
 
@@ -49,14 +48,17 @@ def main(
     table = Table("variant", "trained, s", *(scene.name for scene in tested), "mean", box=None)
     found = {}
     for settings in variant:
+        config = Config.load(settings=settings.split())
+        params = cast(CostVolumeParams, config.section("costvolume"))
+        net = params.inputs[-1]
         request = Request(
-            replace(open_dataset(dataset), scenes=tested), {"": Config.load(settings=settings.split())},
-            "channels", train=True, training=learnt, also=("truth", "matching_net"),
+            replace(open_dataset(dataset), scenes=tested), {"": config},
+            "channels", train=True, training=learnt, also=("truth", net),
         )  # fmt: skip
         with ProgressWatch() as watch:
             result = carry_out(Task(dataset, cache=cache), request, (), watch, None, None)
-        seconds = result.store.require(result.find("matching_net").key).seconds
-        errors = {scene.name: raw_error(result, scene, rows) for scene in tested}
+        seconds = result.store.require(result.find(net).key).seconds
+        errors = {scene.name: raw_error(result, scene, rows, params) for scene in tested}
         found[settings] = {"seconds": seconds, "raw_bad": errors}
         values = (*errors.values(), float(np.mean([*errors.values()])))
         table.add_row(settings, f"{seconds:.0f}", *(f"{value:.2f}" for value in values))
@@ -87,16 +89,20 @@ def divide(
     return tested, learnt
 
 
-def raw_error(result: Result, scene: SceneSource, rows: int) -> float:
-    """Return the raw error (> 1 px, nonocc, %) of the trained matching-Net on rows in the middle of a scene."""
+def raw_error(result: Result, scene: SceneSource, rows: int, params: CostVolumeParams) -> float:
+    """Return the raw error (> 1 px, nonocc, %) of the trained network on rows in the middle of a scene."""
+    found, margin = scene.disparities, params.context
     views = result.open("channels", scene.name)["channels"].values
-    net = net_from_parameters(result.open("matching_net")["parameters"].values, views.shape[1])
     first = max(0, (views.shape[2] - rows) // 2)
-    padded = np.pad(views, ((0, 0), (0, 0), (RADIUS, RADIUS), (RADIUS, RADIUS)), mode="edge")
-    disparities = range(scene.disparities.minimum, scene.disparities.maximum + 1)
-    costs = padded_cost_volume(net, padded[:, :, first : first + rows + 2 * RADIUS], disparities, resolve("auto"))
+    padded = np.pad(views, ((0, 0), (0, 0), (margin, margin), (margin, margin)), mode="edge")
+    parameters = result.open(params.inputs[-1])["parameters"].values
+    given = {
+        "channels": {"channels": padded[:, :, first : first + rows + 2 * margin]},
+        params.inputs[-1]: {"parameters": parameters},
+    }
+    own = {"d_min": found.minimum, "d_max": found.maximum, "precision": resolve("auto")}
+    made = winner_take_all(compute_costs(params.model_copy(update=own), given)["cost"], found.minimum)
     truth = result.open("truth", scene.name).isel(y=slice(first, first + rows))
-    made = winner_take_all(costs, disparities.start)
     return raw_bad(made, truth["disparity"].values, truth["nonocc"].values, THRESHOLD)
 
 
