@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.guided import Side
+from benchmarks.guided import Side, shipped_nets
 from benchmarks.harness import FOLDER, PAIRS, Ratio, compare, median_seconds, report, timed, write
 from benchmarks.peers import AccurateMatcher, PeerError
 from datasets import Scene, open_dataset
@@ -81,8 +81,7 @@ def _volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: rang
 
 def _guided_volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float16]:
     params = CostVolumeParams(d_min=disparities[0], d_max=disparities[-1], mode="guided", precision=resolve("auto"))
-    net = {"parameters": read_shipped_weights("matching_net", {})["parameters"]}
-    side = Side(params, channels(left, right), range(left.shape[0]), net)
+    side = Side(params, channels(left, right), range(left.shape[0]), shipped_nets())
     side()
     return side.volume
 

@@ -1,6 +1,6 @@
 """The guided cost volume against the exact one: time and raw error, on the same rows of the same scenes.
 
-    python -m benchmarks.guided [DATASET] [--rows N] [--window N] [--votes N]
+    python -m benchmarks.guided [DATASET] [--rows N] [--votes N]
 
 The two sides compute the stage ``costvolume`` of a scene in turn, tile by tile on one thread, from channels in memory.
 The rows lie in the middle of each scene, since an exact volume takes minutes for a whole one; ``--rows 0`` takes all.
@@ -30,6 +30,8 @@ from stages.transforms.channels import channels
 MODES: tuple[Mode, Mode] = ("guided", "exact")
 DEFAULTS = CostVolumeParams()
 TILE_ROWS = COST_VOLUME.tile_rows or 32
+Nets = dict[str, Mapping[str, NDArray[np.generic]]]
+"""The networks' parameters, by product."""
 
 
 @dataclass
@@ -39,7 +41,7 @@ class Side:
     params: CostVolumeParams
     views: NDArray[np.float32]
     rows: range
-    net: dict[str, NDArray[np.float32]]
+    nets: Nets
     volume: NDArray[np.float16] = field(init=False)
 
     def __call__(self) -> None:
@@ -49,7 +51,7 @@ class Side:
         tiles = []
         for top in range(self.rows.start, self.rows.stop, TILE_ROWS):
             block = padded[:, :, top : min(top + TILE_ROWS, self.rows.stop) + 2 * margin]
-            given = {"channels": {"channels": block}, "matching_net": self.net}
+            given = {"channels": {"channels": block}, **self.nets}
             tiles.append(COST_VOLUME.function()(self.params, given)["cost"])
         self.volume = np.concatenate(tiles)
 
@@ -65,7 +67,12 @@ class Outcome:
     errors: tuple[float, float]
 
 
-def measure(scene: SceneSource, net: dict[str, NDArray[np.float32]], rows: int, guiding: Mapping[str, int]) -> Outcome:
+def shipped_nets() -> Nets:
+    """Return the networks that a guided volume takes."""
+    return {net: read_shipped_weights(net, {}) for net in CostVolumeParams(mode="guided").inputs[1:]}
+
+
+def measure(scene: SceneSource, nets: Nets, rows: int, votes: int) -> Outcome:
     """Time both sides in turn; return the share of the valid cells that was judged, and raw errors (> 1 px, nonocc)."""
     loaded = scene.load()
     if loaded.truth is None:
@@ -76,7 +83,10 @@ def measure(scene: SceneSource, net: dict[str, NDArray[np.float32]], rows: int, 
     views, low, high = channels(loaded.left, loaded.right), scene.disparities.minimum, scene.disparities.maximum
     sides = [
         Side(
-            CostVolumeParams(d_min=low, d_max=high, mode=mode, precision=resolve("auto"), **guiding), views, taken, net
+            CostVolumeParams(d_min=low, d_max=high, mode=mode, precision=resolve("auto"), votes=votes),
+            views,
+            taken,
+            nets,
         )
         for mode in MODES
     ]
@@ -90,16 +100,14 @@ def measure(scene: SceneSource, net: dict[str, NDArray[np.float32]], rows: int, 
 def main(
     dataset: Annotated[str, typer.Argument(help="such as middlebury:DIR")] = "motorcycle",
     rows: Annotated[int, typer.Option(help="rows of each scene; 0: all")] = 32,
-    window: Annotated[int, typer.Option(help="costvolume.window")] = DEFAULTS.window,
     votes: Annotated[int, typer.Option(help="costvolume.votes")] = DEFAULTS.votes,
 ) -> None:
     """Measure each scene, print what was found of each, and report the ratios."""
     one_thread()
-    net = {"parameters": read_shipped_weights("matching_net", {})["parameters"]}
+    nets = shipped_nets()
     scenes = [scene for scene in open_dataset(dataset).scenes if scene.has_truth]
-    guiding = {"window": window, "votes": votes}
-    measure(scenes[0], net, 4, guiding)  # the warm-up, which compiles
-    found = [measure(scene, net, rows, guiding) for _ in range(-(-PAIRS // len(scenes))) for scene in scenes]
+    measure(scenes[0], nets, 4, votes)  # the warm-up, which compiles
+    found = [measure(scene, nets, rows, votes) for _ in range(-(-PAIRS // len(scenes))) for scene in scenes]
     table = Table("scene", "times exact", "cells judged, %", "raw error guided, %", "exact, %", box=None)
     for each in found:
         figures = (each.speed, each.judged, *each.errors)

@@ -1,6 +1,6 @@
 """What other ways of training do on scenes held out: ``python -m benchmarks.recipe DATASET --variant SETTINGS``.
 
-The network of each variant's cost volume (the descriptor-Net with ``costvolume.mode=fast``) is trained anew on the
+The networks of each variant's cost volume (with ``costvolume.mode=fast``: the descriptor-Net) are trained anew on the
 training scenes but those held out and their siblings, and the raw maps are judged on rows in the middle of the held-out
 scenes. So settings are chosen without a look at the scenes of the final figures. To compare at equal cost, give each
 variant the steps that take as long; the table says how long they took.
@@ -50,14 +50,14 @@ def main(
     for settings in variant:
         config = Config.load(settings=settings.split())
         params = cast(CostVolumeParams, config.section("costvolume"))
-        net = params.inputs[-1]
+        nets = params.inputs[1:]
         request = Request(
             replace(open_dataset(dataset), scenes=tested), {"": config},
-            "channels", train=True, training=learnt, also=("truth", net),
+            "channels", train=True, training=learnt, also=("truth", *nets),
         )  # fmt: skip
         with ProgressWatch() as watch:
             result = carry_out(Task(dataset, cache=cache), request, (), watch, None, None)
-        seconds = result.store.require(result.find(net).key).seconds
+        seconds = sum(result.store.require(result.find(net).key).seconds for net in nets)
         errors = {scene.name: raw_error(result, scene, rows, params) for scene in tested}
         found[settings] = {"seconds": seconds, "raw_bad": errors}
         values = (*errors.values(), float(np.mean([*errors.values()])))
@@ -90,16 +90,13 @@ def divide(
 
 
 def raw_error(result: Result, scene: SceneSource, rows: int, params: CostVolumeParams) -> float:
-    """Return the raw error (> 1 px, nonocc, %) of the trained network on rows in the middle of a scene."""
+    """Return the raw error (> 1 px, nonocc, %) of the trained networks on rows in the middle of a scene."""
     found, margin = scene.disparities, params.context
     views = result.open("channels", scene.name)["channels"].values
     first = max(0, (views.shape[2] - rows) // 2)
     padded = np.pad(views, ((0, 0), (0, 0), (margin, margin), (margin, margin)), mode="edge")
-    parameters = result.open(params.inputs[-1])["parameters"].values
-    given = {
-        "channels": {"channels": padded[:, :, first : first + rows + 2 * margin]},
-        params.inputs[-1]: {"parameters": parameters},
-    }
+    given = {net: {"parameters": result.open(net)["parameters"].values} for net in params.inputs[1:]}
+    given["channels"] = {"channels": padded[:, :, first : first + rows + 2 * margin]}
     own = {"d_min": found.minimum, "d_max": found.maximum, "precision": resolve("auto")}
     made = winner_take_all(compute_costs(params.model_copy(update=own), given)["cost"], found.minimum)
     truth = result.open("truth", scene.name).isel(y=slice(first, first + rows))

@@ -137,11 +137,12 @@ def compute_costs(params: CostVolumeParams, inputs: Inputs) -> dict[str, NDArray
 
 
 def _costs(params: CostVolumeParams, inputs: Inputs) -> NDArray[np.float32]:
-    channels = inputs["channels"]["channels"]
+    channels, disparities, precision = inputs["channels"]["channels"], params.disparities, params.precision
+    if params.mode == "exact":
+        net = net_from_parameters(inputs["matching_net"]["parameters"], channels.shape[1])
+        return padded_cost_volume(net, channels, disparities, precision)
+    descriptor_net = descriptor_net_from_parameters(inputs["descriptor_net"]["parameters"], channels.shape[1])
     if params.mode == "fast":
-        descriptor_net = descriptor_net_from_parameters(inputs["descriptor_net"]["parameters"], channels.shape[1])
-        return padded_fast_costs(descriptor_net, channels, params.disparities, params.precision)
+        return padded_fast_costs(descriptor_net, channels, disparities, precision)
     net = net_from_parameters(inputs["matching_net"]["parameters"], channels.shape[1])
-    if params.mode == "guided":
-        return padded_guided_costs(net, channels, params.disparities, params.window, params.votes, params.precision)
-    return padded_cost_volume(net, channels, params.disparities, params.precision)
+    return padded_guided_costs(net, descriptor_net, channels, disparities, params.votes, precision)

@@ -18,10 +18,8 @@ DILATIONS = (1, 1, 2, 4)
 """Distance of the taps of each of the descriptor-Net's kernels, px."""
 REACH = sum(DILATIONS)
 """Pixels that a descriptor looks away from its own."""
-CENSUS = (7, 9)
-"""Rows and columns of the signatures that propose cells to a guided volume."""
-MARGIN = 4 + CENSUS[1] // 2
-"""Pixels around a tile that propose to it, and half a signature."""
+MARGIN = 4 + REACH
+"""Pixels around a tile that propose to it in a guided volume, and what their descriptors see."""
 
 
 class MatchingSamplesParams(Params):
@@ -80,20 +78,19 @@ class CostVolumeParams(Params):
     d_max: int | None = Field(None, description="largest disparity, px; default: the scene's own")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
     mode: Mode = Field(
-        "exact", description="every cell, those alone that a cheap matching proposes, or products of descriptors"
+        "exact", description="every cell, those alone that descriptors propose, or products of descriptors"
     )
-    window: int = Field(7, ge=1, le=31, description="side of the window that proposals are matched over, px, odd")
     votes: int = Field(6, ge=1, le=144, description="pixels a proposal needs, of 144 in and around a tile")
 
     @property
     def context(self) -> int:
         """Pixels that a cell looks away from its own."""
-        return {"exact": RADIUS, "guided": MARGIN + self.window // 2, "fast": REACH}[self.mode]
+        return {"exact": RADIUS, "guided": MARGIN, "fast": REACH}[self.mode]
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """The products that the mode needs."""
-        return ("channels", "descriptor_net" if self.mode == "fast" else "matching_net")
+        return ("channels", *_NETS[self.mode])
 
     @property
     def disparities(self) -> range:
@@ -110,8 +107,6 @@ class CostVolumeParams(Params):
     def _ordered(self) -> "CostVolumeParams":
         if self.d_min is not None and self.d_max is not None and self.d_max < self.d_min:
             raise ValueError(f"d_max {self.d_max} lies below d_min {self.d_min}")
-        if self.window % 2 == 0:
-            raise ValueError(f"window is {self.window} px, expected an odd number")
         return self
 
     @model_serializer(mode="wrap")
@@ -121,7 +116,13 @@ class CostVolumeParams(Params):
         return {name: value for name, value in fields.items() if name not in _WITHOUT[self.mode]}
 
 
-_WITHOUT = {"exact": ("mode", "window", "votes"), "guided": (), "fast": ("window", "votes")}
+_NETS = {
+    "exact": ("matching_net",),
+    "guided": ("matching_net", "descriptor_net"),
+    "fast": ("descriptor_net",),
+}
+"""The networks that a volume of each mode takes."""
+_WITHOUT = {"exact": ("mode", "votes"), "guided": (), "fast": ("votes",)}
 """The settings that a volume of each mode does not depend on."""
 
 MATCHING_SAMPLES = Stage(

@@ -1,6 +1,6 @@
 """The guided cost volume: the exact one in the cells that can win, nothing in the others.
 
-A cheap matching proposes disparities to each tile of 4 x 4 px (see ``candidates``), and the network judges these
+The descriptor-Net proposes disparities to each tile of 4 x 4 px (see ``candidates``), and the matching-Net judges these
 (see ``sparse``). A cell that was not judged is NaN, as one whose right pixel lies outside the image is, so that
 whatever reads a volume passes over both; they differ in that ``x - d`` is a column of the image for the former.
 """
@@ -12,8 +12,10 @@ import torch
 from numpy.typing import NDArray
 
 from stages.allocator import keep_freed_memory
-from stages.matching.candidates import Tiles, candidates, context
-from stages.matching.declaration import RADIUS
+from stages.matching.candidates import Tiles, candidates
+from stages.matching.declaration import MARGIN, RADIUS
+from stages.matching.descriptor_net import DescriptorNet
+from stages.matching.fast import padded_fast_costs
 from stages.matching.net import MatchingNet, require_views
 from stages.matching.sparse import BATCH, judge_tiles
 from stages.matching.winograd import TILE
@@ -27,19 +29,19 @@ COLUMNS = 64
 
 def guided_cost_volume(
     net: MatchingNet,
+    descriptor_net: DescriptorNet,
     channels: NDArray[np.float32],
     disparities: range,
-    window: int,
     votes: int,
     precision: Precision = "float32",
 ) -> NDArray[np.float32]:
     """Return the matching costs of a whole pair in the cells that can win.
 
     Args:
-        net: the matching-Net.
-        channels: float32 (view, channel, y, x), left view first; the first channel proposes.
+        net: the matching-Net, which judges.
+        descriptor_net: the descriptor-Net, which proposes.
+        channels: float32 (view, channel, y, x), left view first.
         disparities: consecutive disparities, px; may be negative.
-        window: side of the square that the proposals match, px, odd.
         votes: pixels that a proposal needs.
         precision: arithmetic of the convolutions.
 
@@ -48,33 +50,33 @@ def guided_cost_volume(
         image. A pixel with any valid cell has a cost in at least one.
 
     Raises:
-        StageError: if the channels do not fit the network.
+        StageError: if the channels do not fit the networks.
     """
     require_shape("channels", channels, 4)
-    margin = (context(window),) * 2
-    padded = np.pad(channels, ((0, 0), (0, 0), margin, margin), mode="edge")
-    return padded_guided_costs(net, padded, disparities, window, votes, precision)
+    margin = ((0, 0), (0, 0), (MARGIN, MARGIN), (MARGIN, MARGIN))
+    padded = np.pad(channels, margin, mode="edge")
+    return padded_guided_costs(net, descriptor_net, padded, disparities, votes, precision)
 
 
 def padded_guided_costs(
     net: MatchingNet,
+    descriptor_net: DescriptorNet,
     channels: NDArray[np.float32],
     disparities: range,
-    window: int,
     votes: int,
     precision: Precision = "float32",
 ) -> NDArray[np.float32]:
-    """As ``guided_cost_volume``, of views that bring ``context(window)`` px of context on every side."""
+    """As ``guided_cost_volume``, of views that bring 12 px of context on every side."""
     require_views(net, channels)
-    margin = context(window)
-    height, width = (length - 2 * margin for length in channels.shape[2:])
-    chosen = candidates(channels, disparities, window, votes)
+    height, width = (length - 2 * MARGIN for length in channels.shape[2:])
+    proposing = padded_fast_costs(descriptor_net, channels[..., TILE:-TILE], disparities, precision)
+    chosen = candidates(proposing, disparities.start, votes)
     volume = np.full((*(TILE * count for count in chosen.shape[:2]), len(disparities)), np.nan, np.float32)
     tiles = volume.reshape(chosen.shape[0], TILE, chosen.shape[1], TILE, len(disparities))
     keep_freed_memory()
     one_thread()
     with torch.inference_mode(), autocast(precision):
-        own = slice(margin - RADIUS, RADIUS - margin)
+        own = slice(MARGIN - RADIUS, RADIUS - MARGIN)
         judge = judge_tiles(net, torch.from_numpy(np.ascontiguousarray(channels[:, :, own, own])), precision)
         for row, column, index in _batches(chosen):
             places = np.stack([row * TILE, column * TILE, index + disparities.start], 1)

@@ -20,7 +20,7 @@ class Made:
     [
         pytest.param({"d_min": 0, "d_max": 9, "precision": "float32"}, DEFAULTS, id="what a run fills in by itself"),
         pytest.param(
-            {"mode": "guided", "window": 7, "votes": 5},
+            {"mode": "guided", "votes": 5},
             "costvolume.mode=guided costvolume.votes=5",
             id="a setting that the default's key does not have",
         ),

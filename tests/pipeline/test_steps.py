@@ -176,7 +176,7 @@ def test_a_guided_volume_is_another_product() -> None:
         find(graph(*settings, upto="costvolume"), "costvolume") for settings in ((), ("costvolume.mode=guided",))
     )
     assert exact.id != guided.id and guided.settings["mode"] == "guided"
-    assert guided.settings["tiles"] == "32 rows, halo 11, edge"
+    assert guided.settings["tiles"] == "32 rows, halo 12, edge"
 
 
 def test_a_fast_volume_is_made_by_the_descriptor_net_alone() -> None:

@@ -40,9 +40,9 @@ def test_the_range_includes_both_ends() -> None:
     ("given", "dumped"),
     [
         pytest.param({}, {}, id="exact, the default: as if there were no other mode"),
-        pytest.param({"window": 5, "votes": 3}, {}, id="exact: what only a guided volume depends on is left out"),
-        pytest.param({"mode": "guided"}, {"mode": "guided", "window": 7, "votes": 6}, id="guided"),
-        pytest.param({"mode": "fast", "window": 5}, {"mode": "fast"}, id="fast: nothing proposes"),
+        pytest.param({"votes": 3}, {}, id="exact: what only a guided volume depends on is left out"),
+        pytest.param({"mode": "guided"}, {"mode": "guided", "votes": 6}, id="guided"),
+        pytest.param({"mode": "fast", "votes": 5}, {"mode": "fast"}, id="fast: nothing proposes"),
     ],
 )
 def test_only_what_a_volume_depends_on_is_in_its_key(given: dict[str, object], dumped: dict[str, object]) -> None:
@@ -61,7 +61,6 @@ def test_a_range_without_both_ends_is_refused(known: dict[str, int]) -> None:
     [
         pytest.param(CostVolumeParams, {"d_min": 5, "d_max": 4}, "d_max 4 lies below d_min 5", id="range upside down"),
         pytest.param(CostVolumeParams, {"mode": "full"}, "'exact', 'guided' or 'fast'", id="unknown mode"),
-        pytest.param(CostVolumeParams, {"window": 8}, "window is 8 px, expected an odd number", id="no centre"),
         pytest.param(MatchingSamplesParams, {"slots": 2}, "greater than or equal to 3", id="too few disparities"),
         pytest.param(MatchingSamplesParams, {"height": 0}, "greater than or equal to 1", id="empty crop"),
         pytest.param(MatchingSamplesParams, {"form": "sparse"}, "'dense' or 'patch'", id="unknown form"),
