@@ -61,7 +61,8 @@ class MatchingNetParams(Schedule):
 class DescriptorNetParams(Schedule):
     """The descriptor-Net of a fast volume and how it is trained."""
 
-    steps: int = Field(4500, ge=1, description="optimiser steps")
+    steps: int = Field(9000, ge=1, description="optimiser steps")
+    peak_rate: float = Field(0.008, gt=0, description="highest learning rate")
     batch: int = Field(
         8, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"
     )
