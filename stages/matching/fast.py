@@ -55,7 +55,7 @@ def padded_fast_costs(
     keep_freed_memory()
     one_thread()
     with torch.inference_mode():
-        left, right = (_descriptors(net, view, precision) for view in channels)
+        left, right = _descriptors(net, torch.from_numpy(np.ascontiguousarray(channels)), precision)
         smallest, largest = disparities[0], disparities[-1]
         # Beyond the right view there are zeros, so that every product has all its diagonals.
         right = functional.pad(right, (0, 0, max(0, largest), max(0, -smallest)))
@@ -70,14 +70,14 @@ def padded_fast_costs(
     return volume
 
 
-def _descriptors(net: DescriptorNet, view: NDArray[np.float32], precision: Precision) -> Tensor:
-    """Return the descriptors of a padded view: (y, x, number)."""
+def _descriptors(net: DescriptorNet, views: Tensor, precision: Precision) -> list[Tensor]:
+    """Return the descriptors of each padded view: (y, x, number)."""
     if precision == "float32":
-        return transformed_descriptors(net, kernels_of(net), torch.from_numpy(np.ascontiguousarray(view)))
-    image = torch.from_numpy(np.ascontiguousarray(view))[None].contiguous(memory_format=torch.channels_last)
+        kernels = kernels_of(net)
+        return [transformed_descriptors(net, kernels, view) for view in views]
     with autocast(precision):
-        made: Tensor = net(image)
-    return made[0].permute(1, 2, 0).contiguous()
+        made: Tensor = net(views.contiguous(memory_format=torch.channels_last))
+    return list(made.permute(0, 2, 3, 1).contiguous())
 
 
 def diagonals(products: Tensor, count: int) -> Tensor:
