@@ -39,7 +39,7 @@ from stages.matching.winograd import (
 
 WHOLE = TILE * max(DILATIONS)
 """Rows and columns of descriptors are made up to a multiple of this: then every layer has whole tiles."""
-TILES = 192
+TILES = 96
 """Tiles that are transformed at once."""
 
 Corner = tuple[int, int]
