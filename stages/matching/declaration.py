@@ -81,7 +81,7 @@ class CostVolumeParams(Params):
     mode: Mode = Field(
         "exact", description="every cell, those alone that descriptors propose, or products of descriptors"
     )
-    votes: int = Field(6, ge=1, le=144, description="pixels a proposal needs, of 144 in and around a tile")
+    votes: int = Field(24, ge=1, le=144, description="pixels a proposal needs, of 144 in and around a tile")
 
     @property
     def context(self) -> int:

@@ -41,7 +41,7 @@ def test_the_range_includes_both_ends() -> None:
     [
         pytest.param({}, {}, id="exact, the default: as if there were no other mode"),
         pytest.param({"votes": 3}, {}, id="exact: what only a guided volume depends on is left out"),
-        pytest.param({"mode": "guided"}, {"mode": "guided", "votes": 6}, id="guided"),
+        pytest.param({"mode": "guided"}, {"mode": "guided", "votes": 24}, id="guided"),
         pytest.param({"mode": "fast", "votes": 5}, {"mode": "fast"}, id="fast: nothing proposes"),
     ],
 )
