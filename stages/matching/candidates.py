@@ -8,7 +8,6 @@ proposed. What wins at few pixels is mostly wrong: to leave it out is worth more
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.disparity import winner_take_all
 from stages.kernel import kernel
 from stages.matching.winograd import TILE
 
@@ -32,9 +31,9 @@ def candidates(costs: NDArray[np.float32], d_min: int, votes: int) -> Tiles:
         bool (ceil(y / 4), ceil(x / 4), d), only where a cell of the tile is valid; at least one such disparity for
         each pixel that has any.
     """
-    found = winner_take_all(costs, d_min)
-    winners = np.where(np.isnan(found), -1, found - d_min).astype(np.int32)
-    height, width = found.shape[0] - 2 * TILE, found.shape[1]
+    outside = np.isnan(costs)
+    winners = np.where(outside.all(2), -1, np.where(outside, np.inf, costs).argmin(2)).astype(np.int32)
+    height, width = winners.shape[0] - 2 * TILE, winners.shape[1]
     chosen = np.zeros((-(-height // TILE), -(-width // TILE), costs.shape[2]), np.bool_)
     _vote(winners, d_min, votes, chosen)
     return chosen
