@@ -22,7 +22,7 @@ train: $(READY)  ## DATA=DIR: train both networks on DIR/2001, 2003, 2005 and 20
 	$(BIN)/pipeline run middlebury:$(DATA) --train --upto evaluation_net --output build/weights
 	cp build/weights/*.safetensors stages/weights/
 
-descriptors: $(READY)  ## DATA=DIR: train the network of fast volumes on the same scenes, and put its weights in place
+descriptors: $(READY)  ## DATA=DIR: train the network of guided and fast volumes on the same scenes, and put its weights in place
 	@test -n "$(DATA)" || { echo "make descriptors: say where the Middlebury sets are: make descriptors DATA=DIR"; exit 2; }
 	$(BIN)/pipeline run middlebury:$(DATA) --train --upto descriptor_net --output build/weights
 	cp build/weights/descriptor_net.safetensors stages/weights/

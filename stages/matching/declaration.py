@@ -59,7 +59,7 @@ class MatchingNetParams(Schedule):
 
 
 class DescriptorNetParams(Schedule):
-    """The descriptor-Net of a fast volume and how it is trained."""
+    """The descriptor-Net of guided and fast volumes and how it is trained."""
 
     steps: int = Field(9000, ge=1, description="optimiser steps")
     peak_rate: float = Field(0.008, gt=0, description="highest learning rate")

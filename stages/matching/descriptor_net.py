@@ -1,4 +1,6 @@
-"""descriptor-Net: the network of a *fast* volume, which compares descriptors instead of judging pairs of patches.
+"""descriptor-Net: it compares descriptors of pixels instead of judging pairs of patches.
+
+A *fast* volume is its answer; of a *guided* one it proposes the cells.
 
 Each pixel of a view gets a descriptor, 64 numbers of unit length, from the 17 x 17 px around it; both views go
 through the same four convolutions, so a pair costs two passes whatever its range of disparities. The cost of a cell is
