@@ -41,6 +41,10 @@ def compare(
             "--train-on); may be repeated.",
         ),
     ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option("--without", help="Leave out a matcher or measure, such as mc_cnn_accurate; may be repeated."),
+    ] = None,
     threshold: Annotated[
         float, typer.Option("--threshold", help="Error in px above which tables and figures call a pixel wrong.")
     ] = 1.0,
@@ -70,7 +74,14 @@ def compare(
     experiments = experiment or comparison.EXPERIMENTS
     with ProgressWatch() as watch:
         found = comparison.compare(
-            task, experiments, train_on, protocol or (), watch=watch, scheduler=scheduler, workers=workers
+            task,
+            experiments,
+            train_on,
+            protocol or (),
+            without=without or (),
+            watch=watch,
+            scheduler=scheduler,
+            workers=workers,
         )
     files = comparison_report.write_comparison(found, output, threshold)
     if as_json:

@@ -112,6 +112,7 @@ def compare(
     train_on: str | None = None,
     protocols: Sequence[str] = (),
     *,
+    without: Sequence[str] = (),
     watch: Watch | None = None,
     scheduler: str | None = None,
     workers: int | None = None,
@@ -124,6 +125,7 @@ def compare(
         train_on: dataset whose training scenes O1 and CCNN learn from, and on which matching-Nets with different
             channels are trained from nothing, alike; without it, those rows are left out.
         protocols: of ``PROTOCOLS``: the paper's own, by which both networks are trained and tested beside ours.
+        without: products of other matchers and measures that are left out, such as ``mc_cnn_accurate``.
         watch: as for ``run``.
         scheduler: as for ``run``.
         workers: as for ``run``.
@@ -134,10 +136,11 @@ def compare(
     task = Task(task) if isinstance(task, str) else task
     _require(task, experiments)
     require_protocols(protocols)
+    _require_others(without)
     training = training_scenes(open_dataset(train_on)) if train_on else ()
     plain = task.request("semidense")
     dataset, notes = _with_truth(plain.dataset)
-    products, unavailable = _available(experiments, bool(training))
+    products, unavailable = _available(experiments, bool(training), without)
     request = dataclasses.replace(plain, dataset=dataset, training=training, also=(*_ALWAYS, *products))
     lenient = [(name, each) for name in protocols for each in protocol_requests(name, task, dataset, training)]
     result = carry_out(task, request, (), watch, scheduler, workers)
@@ -161,6 +164,13 @@ def _require(task: Task, experiments: Sequence[str]) -> None:
         raise UsageError("a comparison takes the shipped networks; what is trained beside them is named by train_on")
 
 
+def _require_others(products: Sequence[str]) -> None:
+    others = sorted({*MATCHERS.values(), *(product for product, _ in MEASURES.values())} - {*_ALWAYS})
+    for product in products:
+        if product not in others:
+            raise UsageError(f"--without {product}: no such matcher or measure; {nearest(product, others)}")
+
+
 def _with_truth(dataset: Dataset) -> tuple[Dataset, list[str]]:
     """Return the dataset without the scenes that nothing can be compared on, and a note for each."""
     known = tuple(scene for scene in dataset.scenes if scene.has_truth)
@@ -170,12 +180,14 @@ def _with_truth(dataset: Dataset) -> tuple[Dataset, list[str]]:
     return dataclasses.replace(dataset, scenes=known), notes
 
 
-def _available(experiments: Sequence[str], trained: bool) -> tuple[tuple[str, ...], list[dict[str, str]]]:
+def _available(
+    experiments: Sequence[str], trained: bool, without: Sequence[str]
+) -> tuple[tuple[str, ...], list[dict[str, str]]]:
     """Return the products that the experiments need and that can be made, and why others cannot."""
     wanted = {method: product for method, product in MATCHERS.items() if {"raw", "density"} & set(experiments)}
     if "auc" in experiments:
         wanted |= {method: product for method, (product, _) in MEASURES.items() if product not in _ALWAYS}
-    reasons = {product: _reason(product, trained) for product in wanted.values()}
+    reasons = {product: _reason(product, trained, without) for product in wanted.values()}
     products = tuple(product for product, reason in reasons.items() if not reason)
     missing = {method: reasons[product] for method, product in wanted.items() if reasons[product]}
     if "raw" in experiments:
@@ -185,8 +197,10 @@ def _available(experiments: Sequence[str], trained: bool) -> tuple[tuple[str, ..
     return products, [{"method": method, "why": why} for method, why in missing.items()]
 
 
-def _reason(product: str, trained: bool) -> str:
-    """Return why a product cannot be made; nothing if it can."""
+def _reason(product: str, trained: bool, without: Sequence[str]) -> str:
+    """Return why a product is not made; nothing if it is."""
+    if product in without:
+        return "left out on request"
     inputs = (STAGES[name] for name in STAGES[product].inputs if name in STAGES)
     packages = [name for stage in (STAGES[product], *inputs) for name in missing_packages(stage)]
     if packages:

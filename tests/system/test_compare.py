@@ -139,12 +139,22 @@ def test_without_a_package_its_rows_say_so(monkeypatch: pytest.MonkeyPatch) -> N
     from pipeline import comparison, environment
 
     monkeypatch.setattr(environment, "_installed", lambda _: False)
-    products, unavailable = comparison._available(EXPERIMENTS, True)
+    products, unavailable = comparison._available(EXPERIMENTS, True, ())
     reasons = {each["method"]: each["why"] for each in unavailable}
     assert products == ("sncc", "census", "cost_confidence", "ccnn")
     assert "opencv-python-headless" in reasons["SGM (OpenCV SGBM)"] and "mccnn" in reasons["MC-CNN fast"]
     assert "scikit-learn" in reasons["O1"]
     assert set(NAMED) <= set(reasons)
+
+
+def test_what_is_left_out_is_not_made_and_says_so(task: Task) -> None:
+    left_out = ("census", "cost_confidence")
+    made = compare(replace(task, dataset=TEST_ONLY), ("density", "auc"), without=left_out)
+    reasons = {each["method"]: each["why"] for each in made.unavailable}
+    gone = {"census", "APKR", "PKRN", "left-right difference", "cost"}
+    assert {method for method, why in reasons.items() if why == "left out on request"} == gone
+    assert "SNCC" in methods(made, "density") and not gone & {row["method"] for row in made.rows}
+    assert not {*left_out} & {each.step.product for each in made.result.made.values()}
 
 
 def test_files_hold_all_rows_and_what_is_quoted(found: Comparison, tmp_path: Path) -> None:
@@ -186,6 +196,7 @@ def test_tables_are_of_the_threshold_that_was_wished_for(found: Comparison, caps
         pytest.param(["--train-on", TEST_ONLY], "no training scene", id="nothing to train on"),
         pytest.param(["--protocol", "fold"], "did you mean folds", id="a protocol that does not exist"),
         pytest.param(["--protocol", "folds"], "2 folds take 2 scenes", id="too few scenes for folds"),
+        pytest.param(["--without", "mc-cnn"], "did you mean mc_cnn?", id="a matcher that does not exist"),
         pytest.param(["--threshold", "3"], "--threshold 3: figures are worked out for 0.5, 1, 2, 4 px", id="threshold"),
         pytest.param(["--set", "sgm.windo=3"], "did you mean sgm.window", id="a setting that does not exist"),
     ],
