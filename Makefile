@@ -2,8 +2,10 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
+MODE ?= exact
+OF_MODE := $(if $(filter exact,$(MODE)),,.$(MODE))
 
-.PHONY: demo test lint train descriptors calibration bench faults wheel clean
+.PHONY: demo test lint train descriptors evaluation calibration bench faults wheel clean
 
 demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
 	$(BIN)/pipeline run motorcycle --output demo
@@ -27,10 +29,16 @@ descriptors: $(READY)  ## DATA=DIR: train the network of guided and fast volumes
 	$(BIN)/pipeline run middlebury:$(DATA) --train --upto descriptor_net --output build/weights
 	cp build/weights/descriptor_net.safetensors stages/weights/
 
-calibration: $(READY)  ## DATA=DIR: measure on the same scenes what the confidence is worth, and put the table in place
+evaluation: $(READY)  ## DATA=DIR MODE=guided: train the evaluation-Net of such volumes, and put its weights in place
+	@test -n "$(DATA)" || { echo "make evaluation: say where the Middlebury sets are: make evaluation DATA=DIR"; exit 2; }
+	$(BIN)/pipeline run middlebury:$(DATA) --train --upto evaluation_net --set costvolume.mode=$(MODE) \
+		--set 'training.shipped=["matching_net", "descriptor_net"]' --output build/$(MODE)
+	cp build/$(MODE)/evaluation_net.safetensors stages/weights/evaluation_net$(OF_MODE).safetensors
+
+calibration: $(READY)  ## DATA=DIR MODE=guided: measure on the same scenes what its confidence is worth, put the table in place
 	@test -n "$(DATA)" || { echo "make calibration: say where the Middlebury sets are: make calibration DATA=DIR"; exit 2; }
-	$(BIN)/pipeline run middlebury:$(DATA) --train --upto calibration --output build/weights
-	cp build/weights/calibration.safetensors stages/weights/
+	$(BIN)/pipeline run middlebury:$(DATA) --train --upto calibration --set costvolume.mode=$(MODE) --output build/$(MODE)
+	cp build/$(MODE)/calibration.safetensors stages/weights/calibration$(OF_MODE).safetensors
 
 bench: $(READY)  ## DATA=DIR (optional): every benchmark of speed, bfloat16 against float32, what guarding costs, a time line
 	$(BIN)/python -m benchmarks

@@ -8,7 +8,7 @@ import json
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -32,10 +32,13 @@ from stages.transforms.declaration import ChannelsParams
 
 
 class TrainingParams(Params):
-    """Where the training scenes come from. In no key: the scenes themselves are, by their content."""
+    """What is trained, and on what. In no key: the scenes and networks themselves are, by their content."""
 
     dataset: str | None = Field(
         None, description="dataset whose training scenes are learnt from; default: the dataset of the run"
+    )
+    shipped: tuple[Literal["matching_net", "descriptor_net"], ...] = Field(
+        (), description="networks that a training takes as they come with the package"
     )
 
 

@@ -6,6 +6,7 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 
 from stages.catalog import STAGES
+from stages.matching.declaration import Mode
 from stages.stage import Array, Inputs, Stage, StageError
 
 WEIGHTS = {
@@ -18,6 +19,8 @@ WEIGHTS = {
     for product, stage in STAGES.items()
     if product in ("matching_net", "descriptor_net", "evaluation_net", "calibration")
 }
+_OF_A_MODE = ("evaluation_net", "calibration")
+"""Products that are learnt from raw maps, and so belong to a kind of volume."""
 _HOW = {
     "calibration": "no calibration comes with this installation: a wanted error and calibrated probabilities need one; "
     "`make calibration DATA=DIR` makes it from Middlebury's training scenes"
@@ -25,34 +28,47 @@ _HOW = {
 """What to do about a missing file, where it is not to train."""
 
 
-def weights_file(product: str) -> Traversable:
-    """Return the file of a product's shipped weights.
+def weights_name(product: str, mode: Mode) -> str:
+    """Return the name of a product's shipped weights for volumes of a mode.
+
+    >>> weights_name("evaluation_net", "guided"), weights_name("matching_net", "guided")
+    ('evaluation_net.guided', 'matching_net')
+    """
+    return f"{product}.{mode}" if product in _OF_A_MODE and mode != "exact" else product
+
+
+def weights_file(name: str) -> Traversable:
+    """Return the file of shipped weights.
 
     Raises:
         StageError: if this installation has none.
     """
-    file = resources.files("stages") / "weights" / f"{product}.safetensors"
+    file = resources.files("stages") / "weights" / f"{name}.safetensors"
     if not file.is_file():
-        missing = f"no weights for {product} come with this installation: train them with --train"
-        raise StageError(_HOW.get(product, missing))
+        missing = f"no weights for {name} come with this installation: train them with --train"
+        raise StageError(_HOW.get(_product(name), missing))
     return file
 
 
 @cache
-def weights_digest(product: str) -> str:
-    """Return the sha256 of a product's shipped weights."""
-    return hashlib.sha256(weights_file(product).read_bytes()).hexdigest()
+def weights_digest(name: str) -> str:
+    """Return the sha256 of shipped weights."""
+    return hashlib.sha256(weights_file(name).read_bytes()).hexdigest()
 
 
-def read_shipped_weights(product: str, _: Inputs) -> dict[str, Array]:
+def read_shipped_weights(name: str, _: Inputs) -> dict[str, Array]:
     """Return a shipped network as its training left it, checked."""
     from stages.weights import read_weights
 
-    return {**read_weights(product, weights_file(product).read_bytes())}
+    return {**read_weights(_product(name), weights_file(name).read_bytes())}
 
 
-def read_shipped_table(product: str, _: Inputs) -> dict[str, Array]:
+def read_shipped_table(name: str, _: Inputs) -> dict[str, Array]:
     """Return the shipped calibration, checked."""
     from stages.weights.tables import read_table
 
-    return read_table(weights_file(product).read_bytes())
+    return read_table(weights_file(name).read_bytes())
+
+
+def _product(name: str) -> str:
+    return name.partition(".")[0]

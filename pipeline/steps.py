@@ -27,8 +27,6 @@ NETS = ("matching_net", "descriptor_net", "evaluation_net")
 """Products that are networks."""
 LEARNT = tuple(shipped.WEIGHTS)
 """Products that come with the package, unless one trains."""
-CROSS_FITTED = ("evaluation_samples", "evaluation_net")
-"""Products that a calibration makes anew for each fold, from the scenes of the others."""
 PRODUCTS = ("images", "truth", *(stage.product for stage in CATALOG))
 """The products of the dataflow, in order."""
 ALL_PRODUCTS = ("images", "truth", *STAGES)
@@ -201,14 +199,12 @@ class _Builder:
         graph: what the steps are added to.
         config: of these steps.
         request: what they are for.
-        seen: the training scenes that the evaluation-Net learns from, where those are not all.
         known: ids of the steps that it added, by product and scene.
     """
 
     graph: Graph
     config: Config
     request: Request
-    seen: tuple[SceneSource, ...] | None = None
     known: dict[tuple[str, int], str] = field(default_factory=dict)
 
     def product(self, product: str, scene: SceneSource | None) -> str:
@@ -225,7 +221,8 @@ class _Builder:
         if product == "truth" and scene:
             bounds = [scene.disparities.minimum, scene.disparities.maximum]
             return self._add_source(sources.TRUTH, scene, scene.truth_identity() | {"range": bounds})
-        if product in LEARNT and not self.request.train:
+        trained = self.request.train and product not in self.config.training.shipped
+        if product in LEARNT and not trained:
             return self._add_shipped(product)
         if product == "calibration":
             return self._calibration()
@@ -238,29 +235,31 @@ class _Builder:
 
     def _inputs(self, stage: Stage, product: str, scene: SceneSource | None) -> tuple[str, ...]:
         if stage.scope == "split" and _scope(product) == "scene":
-            scenes = self.seen if self.seen and stage.product in CROSS_FITTED else self.request.training
-            return tuple(self.product(product, source) for source in scenes)
+            return tuple(self.product(product, source) for source in self.request.training)
         return (self.product(product, scene),)
 
     def _calibration(self) -> str:
-        """Add the calibration, for which each training scene is scored by a network that learnt from other folds."""
+        """Add the calibration, for which all networks that score a training scene learnt from other folds."""
         scenes = self.request.training
         config = with_folds(self.config, [scene.name for scene in scenes])
         folds = config.calibration.fold_of_scene or ()
-        seen = {fold: outside(scenes, folds, fold) for fold in set(folds)}
-        builders = {fold: replace(self, config=config, seen=seen[fold], known={}) for fold in seen}
-        scored = tuple(builders[fold].product("confidence", scene) for scene, fold in zip(scenes, folds, strict=True))
-        inputs = {name: tuple(self.product(name, scene) for scene in scenes) for name in ("disparity", "truth")}
-        return replace(self, config=config)._add_stage(STAGES["calibration"], None, {"confidence": scored, **inputs})
+        requests = {fold: replace(self.request, training=outside(scenes, folds, fold)) for fold in set(folds)}
+        builders = {fold: replace(self, config=config, request=requests[fold], known={}) for fold in requests}
+        stage = STAGES["calibration"]
+        inputs = {
+            name: tuple(builders[fold].product(name, scene) for scene, fold in zip(scenes, folds, strict=True))
+            for name in stage.inputs
+        }
+        return replace(self, config=config)._add_stage(stage, None, inputs)
 
     def _add_source(self, stage: Stage, scene: SceneSource, identity: Mapping[str, Any]) -> str:
         code = code_parts(stage.module, PACKAGES) | code_parts(scene.reader, PACKAGES)
         return self._add(stage, scene, scene, identity, {}, code)
 
     def _add_shipped(self, product: str) -> str:
-        stage = shipped.WEIGHTS[product]
-        settings = {"shipped": shipped.weights_digest(product)}
-        return self._add(stage, None, product, settings, {}, code_parts(stage.module, PACKAGES))
+        stage, name = shipped.WEIGHTS[product], shipped.weights_name(product, self.config.costvolume.mode)
+        settings = {"shipped": shipped.weights_digest(name)}
+        return self._add(stage, None, name, settings, {}, code_parts(stage.module, PACKAGES))
 
     def _add_stage(self, stage: Stage, scene: SceneSource | None, inputs: Mapping[str, tuple[str, ...]]) -> str:
         params = resolved(self.config.section(stage.product), scene)

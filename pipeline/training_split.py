@@ -26,7 +26,10 @@ def training_scenes(dataset: Dataset) -> tuple[SceneSource, ...]:
 
 
 def with_folds(config: Config, names: Sequence[str]) -> Config:
-    """Return the configuration with a fold for each training scene, and with the schedule of the folds' networks.
+    """Return the configuration of the folds: which scenes are in which, and the schedule of their networks.
+
+    All networks of a fold are trained, since those that come with the package have seen its scenes, for so many steps
+    that they see a scene as often as the networks of all scenes do.
 
     Raises:
         UsageError: if the folds that are set do not fit the scenes, or there are fewer scenes than folds.
@@ -38,13 +41,11 @@ def with_folds(config: Config, names: Sequence[str]) -> Config:
             f"calibration.fold_of_scene names {len(set(folds))} folds of {len(folds)} scenes; there are {len(names)} "
             "training scenes, and it takes two folds at least"
         )
-    parts = len(set(folds))
-    # A network of a fold sees a scene as often as the network of all does.
-    steps = params.steps or max(1, round(config.evaluation_net.steps * (parts - 1) / parts))
-    update = {
-        "calibration": params.model_copy(update={"fold_of_scene": folds}),
-        "evaluation_net": config.evaluation_net.model_copy(update={"steps": steps}),
-    }
+    share = 1 - 1 / len(set(folds))
+    nets = {name: getattr(config, name) for name in ("matching_net", "descriptor_net", "evaluation_net")}
+    update = {name: net.model_copy(update={"steps": max(1, round(net.steps * share))}) for name, net in nets.items()}
+    update["calibration"] = params.model_copy(update={"fold_of_scene": folds})
+    update["training"] = config.training.model_copy(update={"shipped": ()})
     return config.model_copy(update=update)
 
 

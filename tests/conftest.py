@@ -73,7 +73,7 @@ def weights(trained: "Result", tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         dataset = trained.open(product)
         arrays = {name: dataset[name].values for name in ("parameters", "loss")}
         (folder / f"{product}.safetensors").write_bytes(save_weights(product, arrays, {}))
-    monkeypatch.setattr(shipped, "weights_file", lambda product: folder / f"{product}.safetensors")
+    monkeypatch.setattr(shipped, "weights_file", lambda name: folder / f"{name}.safetensors")
     shipped.weights_digest.cache_clear()
     yield folder
     shipped.weights_digest.cache_clear()

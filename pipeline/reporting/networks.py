@@ -1,6 +1,7 @@
 """How the networks learnt: their loss curves, and of shipped ones what is written in the file."""
 
 import json
+from collections.abc import Mapping
 from importlib.resources import as_file
 from typing import Any
 
@@ -21,38 +22,32 @@ def networks(found: Gathered) -> Html:
 
 
 def _network(found: Gathered, product: str, planned: Planned) -> Html:
-    dataset, shipped = found.store.open(planned.key or ""), "shipped" in planned.step.settings
-    if shipped:
-        dataset = dataset.assign_attrs(params=_configuration(product).get(product, {}))
+    dataset = found.store.open(planned.key or "")
+    about = _metadata(planned.step.argument) if "shipped" in planned.step.settings else None
+    if about is not None:
+        dataset = dataset.assign_attrs(params=about.get("configuration", {}).get(product, {}))
     drawn = svg(
         figure(product, dataset, title=f"{product}: training loss"), f"Training loss of {product} over its steps"
     )
-    return _shipped(product) + drawn if shipped else drawn
+    return drawn if about is None else _shipped(product, about) + drawn
 
 
-def _shipped(product: str) -> Html:
+def _shipped(product: str, about: Mapping[str, Any]) -> Html:
     """Return what the package says of its own weights, which were trained elsewhere."""
-    about = _metadata(product)
+    configuration = about.get("configuration", {})
     steps = f", trained in {about['steps']:,} steps" if "steps" in about else ""
-    name = loss_name(_configuration(product).get(product, {}))
+    name = loss_name(configuration.get(product, {}))
     loss = f" to a final loss of {about['loss']:.3f} ({name}, nats)" if "loss" in about else ""
     told = tag("p", text(f"{product}: the weights that come with the package{steps}{loss}."))
-    parts = _configuration(product).items()
-    settings = [[f"{part}.{name}", value] for part, fields in parts for name, value in fields.items()]
+    settings = [[f"{part}.{name}", value] for part, fields in configuration.items() for name, value in fields.items()]
     if not settings:
         return told
     caption = f"Settings of the training of {product}"
     return told + folded(f"How {product} was trained", table(["setting", "value"], settings, caption=caption, words=2))
 
 
-def _configuration(product: str) -> dict[str, dict[str, Any]]:
-    """Return the settings that the shipped weights were trained with: product -> name -> value."""
-    found: dict[str, dict[str, Any]] = _metadata(product).get("configuration", {})
-    return found
-
-
-def _metadata(product: str) -> dict[str, Any]:
-    """Return what the file of the shipped weights says of how they were made."""
-    with as_file(weights_file(product)) as path, safe_open(path, framework="numpy") as file:
+def _metadata(name: str) -> dict[str, Any]:
+    """Return what a file of shipped weights says of how they were made."""
+    with as_file(weights_file(name)) as path, safe_open(path, framework="numpy") as file:
         written: dict[str, str] = file.metadata() or {}
-    return {name: json.loads(value) for name, value in written.items() if name != "product"}
+    return {field: json.loads(value) for field, value in written.items() if field != "product"}

@@ -16,10 +16,7 @@ class CalibrationParams(Params):
     """How it is found out what the confidence is worth."""
 
     folds: int = Field(
-        2, ge=2, le=10, description="parts of the training scenes; each is scored by a network that learnt the others"
-    )
-    steps: int | None = Field(
-        None, ge=1, description="optimiser steps of those networks; default: evaluation_net.steps"
+        2, ge=2, le=10, description="parts of the training scenes; each is scored by networks that learnt the others"
     )
     tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
     fold_of_scene: tuple[int, ...] | None = Field(
@@ -41,8 +38,9 @@ CALIBRATION = Stage(
     params=CalibrationParams,
     scope="split",
 )
-"""How often a pixel of a confidence is right, in training scenes whose confidence comes from networks that have not
-seen them (cross-fitting). ``confidence`` is one a training scene, each made by the network of its fold."""
+"""How often a pixel of a confidence is right, in training scenes whose raw map and confidence come from networks that
+have not seen them (cross-fitting). ``disparity`` and ``confidence`` are one a scene, made by the networks of its
+fold."""
 
 CALIBRATED_CONFIDENCE = Stage(
     product="calibrated_confidence",

@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Iterator
 from importlib import resources
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -13,14 +14,16 @@ from pipeline import shipped
 from pipeline.api import Result, Task, run
 from pipeline.errors import StageRefused, UsageError
 from pipeline.exporter import export
+from pipeline.lineage import lineage
 from pipeline.pairs import Wishes, match, match_all
 from pipeline.reporting.gathered import gather
 from pipeline.reporting.graph import graph
 from stages.evaluation.calibration_declaration import BINS
 from stages.evaluation.calibration_table import EDGES, Table, choose, probability
+from stages.matching.declaration import Mode
 from stages.stage import StageError
 from stages.weights.tables import read_table, save_table
-from tests.tiny import SETTINGS, SPEC, TEST_ONLY
+from tests.tiny import NETS, SETTINGS, SPEC, TEST_ONLY
 
 
 @pytest.fixture(scope="module")
@@ -32,21 +35,22 @@ def calibrated(trained: Result, tmp_path_factory: pytest.TempPathFactory) -> Res
     return run(Task(SPEC, settings=SETTINGS, train=True, cache=cache), "calibration")
 
 
-def test_each_scene_is_scored_by_a_network_that_has_not_seen_it(calibrated: Result) -> None:
-    steps = {made.step.id: made.step for made in calibrated.made.values()}
+def test_each_scene_is_scored_by_networks_that_have_not_seen_it(calibrated: Result) -> None:
     calibration = calibrated.find("calibration").step
     assert calibration.settings["fold_of_scene"] == [0, 1]
-    for confidence in calibration.inputs["confidence"]:
-        net = steps[steps[confidence].inputs["evaluation_net"][0]]
-        samples = steps[net.inputs["evaluation_samples"][0]]
-        seen = {steps[each].scene for step in (net, samples) for each in step.inputs["disparity"]}
-        assert seen == {"train-0", "train-1"} - {steps[confidence].scene}
-        assert net.settings["steps"] == 1, "half of those for both scenes"
+    for scored in (*calibration.inputs["confidence"], *calibration.inputs["disparity"]):
+        behind = lineage(calibrated.made, scored, over_training=True)
+        nets = {step.product: step for step in behind if step.product in NETS}
+        assert set(nets) >= {"matching_net"}
+        assert all(net.settings["steps"] == 1 for net in nets.values()), "half of those for both scenes"
+        own = calibrated.made[scored].step.scene
+        learnt = {step.scene for step in behind if step.product == "truth"}
+        assert learnt == {"train-0", "train-1"} - {own}
 
 
-def test_the_volumes_of_the_training_run_are_reused(calibrated: Result) -> None:
+def test_the_channels_of_the_training_run_are_reused(calibrated: Result) -> None:
     made = {each.step.product for each in calibrated.made.values() if not each.reused}
-    assert made == {"evaluation_samples", "evaluation_net", "confidence", "calibration"}
+    assert not {"images", "truth", "channels"} & made
 
 
 def test_every_pixel_of_known_truth_is_counted(calibrated: Result) -> None:
@@ -60,22 +64,13 @@ def test_the_file_holds_the_table_and_how_it_was_made(calibrated: Result, tmp_pa
     written = export(calibrated, tmp_path)
     names = [path.name for path in written]
     assert "calibration.safetensors" in names
-    assert not [name for name in names if name.startswith("evaluation_net")], "a fold's network is nobody's weights"
+    assert not [name for name in names if "_net" in name], "a fold's network is nobody's weights"
     read = read_table((tmp_path / "calibration.safetensors").read_bytes())
     assert np.array_equal(read["right"], calibrated.open("calibration")["right"].values)
     with safe_open(tmp_path / "calibration.safetensors", "numpy") as file:
         configuration = json.loads(file.metadata()["configuration"])
-    assert configuration["evaluation_net"]["steps"] == 1
+    assert {configuration[net]["steps"] for net in NETS} == {1}
     assert configuration["calibration"]["folds"] == 2
-
-
-def test_the_steps_are_a_setting(own_task: Task) -> None:
-    from dataclasses import replace
-
-    from pipeline.api import status
-
-    plan = status(replace(own_task, settings=[*own_task.settings, "calibration.steps=7"]), "calibration")
-    assert {each.step.settings["steps"] for each in plan.steps if each.step.product == "evaluation_net"} == {7}
 
 
 def table_file(folder: Path, wrong: int) -> None:
@@ -195,23 +190,19 @@ def test_the_bins_are_wide_enough_for_both_ends() -> None:
     assert EDGES.size == BINS + 1
 
 
-SHIPPED = {
-    name: resources.files("stages") / "weights" / f"{name}.safetensors" for name in ("evaluation_net", "calibration")
-}
-
-
-@pytest.mark.skipif(
-    not all(file.is_file() for file in SHIPPED.values()),
-    reason="stages/weights has no table: make calibration DATA=DIR",
-)
-def test_the_shipped_table_was_made_for_the_shipped_networks() -> None:
+@pytest.mark.parametrize("mode", get_args(Mode))
+def test_the_shipped_table_was_made_for_the_shipped_networks(mode: Mode) -> None:
     about = {}
-    for name, file in SHIPPED.items():
+    for product in ("evaluation_net", "calibration"):
+        file = resources.files("stages") / "weights" / f"{shipped.weights_name(product, mode)}.safetensors"
+        if not file.is_file():
+            pytest.skip(f"{file.name} is not there: make evaluation calibration DATA=DIR MODE={mode}")
         with safe_open(str(file), "numpy") as opened:
-            about[name] = {key: json.loads(text) for key, text in opened.metadata().items() if key != "product"}
+            about[product] = {key: json.loads(text) for key, text in opened.metadata().items() if key != "product"}
     net, table = about["evaluation_net"], about["calibration"]
-    assert table["training_data"]["disparity"] == net["training_data"]["disparity"], "the same raw maps"
+    assert {each["configuration"]["costvolume"].get("mode", "exact") for each in (net, table)} == {mode}
     for section in ("evaluation_samples", "evaluation_net"):
         settings = [{**each["configuration"][section], "steps": None, "precision": None} for each in (net, table)]
         assert settings[0] == settings[1]
-    assert len(read_table(SHIPPED["calibration"].read_bytes())["right"]) == len(net["training_data"]["disparity"])
+    counts = read_table(shipped.weights_file(shipped.weights_name("calibration", mode)).read_bytes())["right"]
+    assert len(counts) == len(net["training_data"]["disparity"]), "a row a scene"

@@ -81,6 +81,21 @@ def test_a_product_of_the_split_is_made_once(upto: str) -> None:
     assert {step.scene for step in made.steps.values()} == {"train-0", "train-1", SPLIT}
 
 
+def test_a_training_can_rest_on_networks_that_come_with_the_package() -> None:
+    made = graph('training.shipped=["matching_net"]', upto="evaluation_net", train=True)
+    assert "matching_samples" not in counts(made)
+    assert find(made, "matching_net", SPLIT).settings == find(graph(), "matching_net", SPLIT).settings
+    assert "shipped" not in find(made, "evaluation_net", SPLIT).settings
+
+
+@pytest.mark.parametrize(("mode", "ending"), [("exact", ""), ("guided", ".guided"), ("fast", ".fast")])
+def test_raw_maps_of_a_mode_are_scored_by_what_was_learnt_from_such(mode: str, ending: str) -> None:
+    made = graph(f"costvolume.mode={mode}", "semidense.max_error=0.1", upto="semidense")
+    used = {step.argument for step in made.steps.values() if "shipped" in step.settings}
+    nets = {"matching_net", "descriptor_net"} - {{"exact": "descriptor_net", "fast": "matching_net"}.get(mode)}
+    assert used == nets | {f"evaluation_net{ending}", f"calibration{ending}"}
+
+
 def test_a_run_stops_at_the_product_asked_for() -> None:
     assert set(counts(graph(upto="channels"))) == {"images", "channels"}
     assert set(counts(graph(upto="costvolume"))) == {"images", "channels", "matching_net", "costvolume"}

@@ -33,13 +33,17 @@ def test_a_network_sees_the_other_folds_only() -> None:
         assert {folds[NAMES.index(name)] for name in seen} == {1 - fold}
 
 
-def test_the_configuration_gets_the_folds_and_their_schedule() -> None:
-    config = with_folds(Config.load(settings=["calibration.steps=7"]), NAMES)
+def test_the_configuration_gets_the_folds() -> None:
+    config = with_folds(Config.load(settings=['training.shipped=["matching_net"]']), NAMES)
     assert config.calibration.fold_of_scene == (0, 1, 1, 0, 0)
-    assert config.evaluation_net.steps == 7
-    for folds, steps in ((2, 1000), (4, 1500)):
-        config = Config.load(settings=[f"calibration.folds={folds}", "evaluation_net.steps=2000"])
-        assert with_folds(config, NAMES).evaluation_net.steps == steps, "a scene is seen as often as by one for all"
+    assert not config.training.shipped, "what comes with the package has seen the scenes"
+
+
+@pytest.mark.parametrize("net", ["matching_net", "descriptor_net", "evaluation_net"])
+@pytest.mark.parametrize(("folds", "steps"), [(2, 1000), (4, 1500)])
+def test_a_network_of_a_fold_sees_a_scene_as_often_as_one_of_all(net: str, folds: int, steps: int) -> None:
+    config = Config.load(settings=[f"calibration.folds={folds}", f"{net}.steps=2000"])
+    assert getattr(with_folds(config, NAMES), net).steps == steps
 
 
 @pytest.mark.parametrize(
