@@ -146,7 +146,7 @@ def _say(match: "Match", about: dict[str, Any]) -> None:
     print(f"{match.scene.name}: {about['rows']} x {about['columns']} px, disparities {low} to {high} px{ends}")
     kept = about["density_percent"] - about["guessed_percent"]
     print(f"  kept {kept:.1f} % of the pixels, at R = {told(match.R)} ({about['R_from']})")
-    if match.choice:
+    if match.basis:
         print(f"  {about['R_basis']}")
     if match.wishes.fill:
         print(f"  {about['guessed_percent']:.1f} % are filled in: guesses (guessed.png)")

@@ -200,14 +200,18 @@ class _Writer:
 
 
 def _basis(match: Match) -> dict[str, Any]:
-    """Return where R comes from; for a wanted error, what it did in training scenes."""
-    if not match.choice:
+    """Return where R comes from; for a wanted error, what to expect and what it came to in training scenes."""
+    if not match.basis:
         return {
             "R_from": "from the pair's own confidences, for the density asked for" if match.wishes.density else "as set"
         }
-    found = match.choice
-    words = f"R = {told(match.R)}: {found.words}"
-    return {"R_from": "for the error asked for", "R_basis": words, "expected_error_percent": 100 * found.error}
+    expected = match.expected_error
+    words = "no pixel is sure enough for that error" if expected is None else f"R = {told(match.R)}"
+    return {
+        "R_from": "for the error asked for",
+        "R_basis": f"{words}; {match.basis.words}",
+        "expected_error_percent": None if expected is None else 100 * expected,
+    }
 
 
 def summary(match: Match) -> dict[str, Any]:

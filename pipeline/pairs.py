@@ -19,7 +19,7 @@ from pipeline.pair_findings import findings
 from pipeline.steps import SPLIT
 from pipeline.tasks import Made, Watch, read_arrays
 from stages import depth as geometry
-from stages.evaluation.calibration_table import Choice, Table, choose
+from stages.evaluation.calibration_table import Outcome, Table, outcome
 
 Unit = Literal["mm", "cm", "m"]
 
@@ -31,8 +31,8 @@ class Wishes:
     Attributes:
         R: least confidence that is kept; None for the configuration's.
         density: share of the image's pixels to keep instead, the most confident, in (0, 1].
-        max_error: share of wrong pixels among the kept instead, in (0, 1), as measured on training scenes that the
-            network had not seen.
+        max_error: share of wrong pixels to expect among the kept instead, in (0, 1), by the pair's own confidences and
+            how often such were right in training scenes that the networks had not seen.
         calibrated: take and give the confidence as the probability that was measured there.
         left_right: drop what the right view's map contradicts by more than ``tolerance`` px.
         tolerance: px.
@@ -172,11 +172,23 @@ class Match:
         return float(self._array("semidense", "R")[0])
 
     @cached_property
-    def choice(self) -> Choice | None:
-        """What the threshold for a wanted error did in training scenes; None if no error was asked for."""
+    def basis(self) -> Outcome | None:
+        """What the wanted error came to in training scenes; None if no error was asked for."""
         if self.wishes.max_error is None:
             return None
-        return choose(Table.of(read_arrays(self.result.store, self.made("calibration").key)), self.wishes.max_error)
+        calibration = read_arrays(self.result.store, self.made("calibration").key)
+        return outcome(Table.of(calibration), calibration["log_odds"], self.wishes.max_error)
+
+    @property
+    def expected_error(self) -> float | None:
+        """The share of wrong pixels to expect among those that the wanted error keeps; None if there is none.
+
+        Raises:
+            UsageError: if neither an error nor calibrated confidences were asked for.
+        """
+        kept = np.isfinite(self._array("semidense", "disparity"))
+        right = self._array("calibrated_confidence", "confidence")[kept]
+        return float(np.mean(1 - right, dtype=np.float64)) if right.size else None
 
     @property
     def density(self) -> float:
@@ -267,13 +279,6 @@ def look(task: Task, watch: Watch | None = None, workers: int | None = None) -> 
     return run(task, "survey", watch=watch, workers=workers)
 
 
-def _require_reachable(task: Task, wishes: Wishes) -> None:
-    """Refuse an error that no threshold keeps to, before anything long is made."""
-    if wishes.max_error is not None:
-        made = run(task, "calibration")
-        choose(Table.of(read_arrays(made.store, made.find("calibration").key)), wishes.max_error)
-
-
 def match_all(
     task: Task,
     wishes: Wishes,
@@ -288,7 +293,6 @@ def match_all(
     dataset = dataset.select(task.scenes) if task.scenes else dataset
     task = replace(task, dataset=dataset)
     others = [look(task, watch, workers)]
-    _require_reachable(task, wishes)
     result = run(task, wishes.product, watch=watch, scheduler=scheduler, workers=workers)
     if wishes.right_view:
         others.append(run(task, "right_disparity", watch=watch, scheduler=scheduler, workers=workers))

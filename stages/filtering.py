@@ -7,8 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from stages.evaluation.calibration_maps import map_threshold
-from stages.evaluation.calibration_table import Table, choose
 from stages.stage import Arrays, Inputs, Output, Params, Stage, StageError
 
 
@@ -23,7 +21,7 @@ class SemidenseParams(Params):
         default=None,
         gt=0,
         lt=1,
-        description="share of wrong pixels among the kept, as measured on held-out training scenes; replaces R",
+        description="share of wrong pixels to expect among the kept, by their calibrated confidences; replaces R",
     )
     calibrated: bool = Field(default=False, description="R is a calibrated probability (calibrated_confidence)")
 
@@ -35,8 +33,8 @@ class SemidenseParams(Params):
     @property
     def inputs(self) -> tuple[str, ...]:
         """The products that these settings need."""
-        confidence = "calibrated_confidence" if self.calibrated else "confidence"
-        return ("disparity", confidence, *(("calibration",) if self.max_error is not None else ()))
+        needed = {"confidence": not self.calibrated, "calibrated_confidence": self.calibrated or bool(self.max_error)}
+        return ("disparity", *(name for name, is_needed in needed.items() if is_needed))
 
     @model_validator(mode="after")
     def _one_wish(self) -> "SemidenseParams":
@@ -93,6 +91,31 @@ def threshold_for(density: float, disparity: NDArray[Any], confidence: NDArray[A
     return float(np.partition(scores, scores.size - kept)[scores.size - kept])
 
 
+def threshold_for_error(max_error: float, disparity: NDArray[Any], probability: NDArray[Any]) -> float:
+    """Return the probability down to which pixels can be kept for a share of wrong ones that is at most as wished.
+
+    What to expect of the kept pixels is the mean of their own probabilities of being wrong. So in a harder map, which
+    has lower ones, less is kept.
+
+    Args:
+        max_error: share of wrong pixels among the kept, in (0, 1).
+        disparity: (y, x) float, NaN unknown; a pixel without one is never kept.
+        probability: (y, x) float in [0, 1], calibrated: that the disparity is right.
+
+    Returns:
+        The least probability that is kept; 1 if no pixel is sure enough.
+
+    >>> threshold_for_error(0.15, np.array([[1.0, 2.0, 3.0, np.nan]]), np.array([[0.7, 0.9, 0.8, 1.0]]))
+    0.8
+    """
+    require_share("max_error", max_error)
+    scores = probability[np.isfinite(disparity) & np.isfinite(probability)]
+    values, counts = np.unique(scores.astype(np.float64), return_counts=True)
+    wrong, kept = np.cumsum((counts * (1 - values))[::-1]), np.cumsum(counts[::-1])
+    reached = np.flatnonzero(wrong <= max_error * kept)
+    return float(values[::-1][reached[-1]]) if reached.size else 1.0
+
+
 def require_share(name: str, value: float) -> None:
     """Refuse a number outside [0, 1].
 
@@ -104,26 +127,22 @@ def require_share(name: str, value: float) -> None:
 
 
 def compute_semidense(params: SemidenseParams, inputs: Inputs) -> Arrays:
-    """Compute the product ``semidense``; see ``keep_confident``, ``threshold_for`` and ``choose``."""
+    """Compute the product ``semidense``; see ``keep_confident``, ``threshold_for`` and ``threshold_for_error``."""
     disparity = inputs["disparity"]["disparity"]
     confidence = inputs["calibrated_confidence" if params.calibrated else "confidence"]["confidence"]
     R = params.R
     if params.density is not None:
         R = threshold_for(params.density, disparity, confidence)
     elif params.max_error is not None:
-        R = _threshold_of(params.max_error, params.calibrated, inputs["calibration"])
+        probability = inputs["calibrated_confidence"]["confidence"]
+        sure = probability >= threshold_for_error(params.max_error, disparity, probability)
+        R = float(confidence[sure].min(initial=1.0))
     return {"disparity": keep_confident(disparity, confidence, R), "R": np.array([R])}
-
-
-def _threshold_of(max_error: float, calibrated: bool, calibration: Arrays) -> float:
-    """Return the R for a wanted error, on the scale of the confidence that is filtered."""
-    R = choose(Table.of(calibration), max_error).R
-    return map_threshold(R, calibration["log_odds"]) if calibrated else R
 
 
 SEMIDENSE = Stage(
     product="semidense",
-    inputs=("disparity", "confidence", "calibration", "calibrated_confidence"),
+    inputs=("disparity", "confidence", "calibrated_confidence"),
     outputs=(
         Output("disparity", ("y", "x"), "float32", "px", "disparity of the left view; NaN: confidence below R"),
         Output("R", ("all",), "float64", "1", "least confidence that was kept"),

@@ -117,8 +117,3 @@ def calibrate(confidence: NDArray[np.float32], mapped: Floats) -> NDArray[np.flo
     beyond = np.where(np.isnan(odds), np.nan, odds - inside)
     result: NDArray[np.float32] = probability(np.interp(inside, EDGES, mapped) + beyond).astype(np.float32)
     return result
-
-
-def map_threshold(R: float, mapped: Floats) -> float:
-    """Return a threshold on the confidence as one on the calibrated confidence."""
-    return float(calibrate(np.array([R], np.float32), mapped)[0])

@@ -1,17 +1,17 @@
-"""Right and wrong pixels by confidence, and the threshold R that keeps the error to a wanted share.
+"""Right and wrong pixels by confidence, and what comes of a threshold or a wanted error.
 
 A table has a row a scene and counts pixels by the log-odds of their confidence. Every scene weighs the same, however
 many of its pixels have a known truth.
 """
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stages.evaluation.calibration_declaration import BINS, LARGEST
-from stages.stage import Arrays, StageError
+from stages.stage import Arrays
 
 EDGES = np.linspace(-LARGEST, LARGEST, BINS + 1)
 """Log-odds between which the bins lie; the first and the last bin take what lies beyond."""
@@ -87,23 +87,11 @@ class Choice(NamedTuple):
         R: least confidence that is kept.
         error: share of wrong pixels among the kept, mean over the scenes that keep any.
         kept: share of the pixels that is kept, mean over the scenes.
-        scenes: how many scenes there are.
-        tolerance: error above which a pixel is wrong, px.
     """
 
     R: float
     error: float
     kept: float
-    scenes: int
-    tolerance: float
-
-    @property
-    def words(self) -> str:
-        """What it rests on."""
-        return (
-            f"{100 * self.error:.3g} % of the pixels kept were wrong by more than {self.tolerance:g} px in "
-            f"{self.scenes} training scenes that the network had not seen"
-        )
 
 
 def choices(table: Table) -> list[Choice]:
@@ -113,35 +101,54 @@ def choices(table: Table) -> list[Choice]:
     error = (wrong / np.maximum(kept, 1)).mean(axis=0)
     share = (kept / np.maximum(kept[:, :1], 1)).mean(axis=0)
     thresholds = np.r_[0.0, probability(EDGES[1:-1])]
-    return [
-        Choice(float(thresholds[bin]), float(error[bin]), float(share[bin]), len(kept), table.tolerance)
-        for bin in np.flatnonzero(all_keep)
-    ]
+    return [Choice(float(thresholds[bin]), float(error[bin]), float(share[bin])) for bin in np.flatnonzero(all_keep)]
 
 
-def choose(table: Table, max_error: float) -> Choice:
-    """Return the smallest threshold at which the error among the kept pixels is at most ``max_error``.
+class Outcome(NamedTuple):
+    """What a wanted error came to in the scenes of a table.
 
-    The error is a mean over scenes, so that it is what to expect of a further scene of their kind, not a bound on it.
+    Attributes:
+        error: share of wrong pixels among the kept, mean over the scenes that keep any; NaN if none does.
+        kept: share of the pixels that is kept, mean over the scenes.
+        scenes: how many scenes there are.
+        tolerance: error above which a pixel is wrong, px.
+    """
+
+    error: float
+    kept: float
+    scenes: int
+    tolerance: float
+
+    @property
+    def words(self) -> str:
+        """What it rests on."""
+        scenes = f"{self.scenes} training scenes that the networks had not seen"
+        if not self.kept:
+            return f"in {scenes} no pixel was sure enough for that error"
+        return (
+            f"in {scenes} the same wish kept {100 * self.kept:.3g} % of the pixels, {100 * self.error:.3g} % of them "
+            f"wrong by more than {self.tolerance:g} px"
+        )
+
+
+def outcome(table: Table, mapped: Floats, max_error: float) -> Outcome:
+    """Return what comes of keeping in each scene as many pixels as are expected to keep the error.
 
     Args:
-        table: of scenes that the network has not seen.
-        max_error: share of wrong pixels among the kept, in (0, 1).
-
-    Raises:
-        StageError: if no threshold reaches it while every scene still keeps something.
+        table: of scenes that the networks have not seen.
+        mapped: calibrated log-odds at ``EDGES``.
+        max_error: mean probability of being wrong among the kept, at most, in (0, 1).
     """
-    found = choices(table)
-    for choice in found:
-        if choice.error <= max_error:
-            return choice
-    if not found:
-        raise StageError("the calibration has a scene without any pixel of known truth: it tells no error")
-    least = min(found, key=lambda choice: choice.error)
-    raise StageError(
-        f"no R keeps the error to {100 * max_error:.3g} %: the least over {least.scenes} training scenes that the "
-        f"network had not seen is {100 * least.error:.3g} %, at R = {told(least.R)}"
-    )
+    pixels = table.right + table.wrong
+    sums, wrong = _above(pixels), _above(table.wrong)
+    expected = _above(pixels * probability(-(mapped[1:] + mapped[:-1]) / 2))
+    kept, errors = [], []
+    for scene, reached in enumerate((sums > 0) & (expected <= max_error * sums)):
+        least = int(np.argmax(reached))
+        kept.append(sums[scene, least] / max(sums[scene, 0], 1) if reached.any() else 0.0)
+        if reached.any():
+            errors.append(wrong[scene, least] / sums[scene, least])
+    return Outcome(float(np.mean(errors)) if errors else float("nan"), float(np.mean(kept)), len(kept), table.tolerance)
 
 
 def told(R: float) -> str:
@@ -153,7 +160,6 @@ def told(R: float) -> str:
     return f"{R:.3f}" if R < 0.99 else f"{R:.5f}"
 
 
-def _above(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+def _above(counts: NDArray[Any]) -> NDArray[Any]:
     """Return the sums over each bin and all above it."""
-    sums: NDArray[np.int64] = np.cumsum(counts[:, ::-1], axis=1)[:, ::-1]
-    return sums
+    return np.cumsum(counts[:, ::-1], axis=1)[:, ::-1]

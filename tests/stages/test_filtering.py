@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from stages.filtering import SEMIDENSE, SemidenseParams, compute_semidense, keep_confident, threshold_for
+from stages.filtering import (
+    SEMIDENSE,
+    SemidenseParams,
+    compute_semidense,
+    keep_confident,
+    threshold_for,
+    threshold_for_error,
+)
 from stages.stage import StageError
 
 N = np.nan
@@ -91,6 +98,42 @@ def test_pixels_that_tie_with_the_last_are_kept_too() -> None:
 
 def test_a_density_of_a_map_without_disparities_keeps_nothing() -> None:
     assert threshold_for(0.5, np.full((2, 2), N), np.ones((2, 2))) == 1
+
+
+@pytest.mark.parametrize(
+    ("max_error", "kept"),
+    [
+        pytest.param(0.01, 0, id="none is so sure"),
+        pytest.param(0.06, 1, id="the surest"),
+        pytest.param(0.16, 2, id="0.15 to expect of two"),
+        pytest.param(0.31, 3, id="all that have a disparity"),
+    ],
+)
+@pytest.mark.parametrize("calibrated", [False, True])
+def test_a_wanted_error_keeps_what_is_expected_to_keep_it(max_error: float, kept: int, calibrated: bool) -> None:
+    """Right with 0.95, 0.75 and 0.4, whatever the confidence: it decides the order alone."""
+    inputs = {
+        "disparity": {"disparity": np.float32([[5, 6, 7, N]])},
+        "confidence": {"confidence": np.float32([[0.2, 0.9, 0.5, 0.99]])},
+        "calibrated_confidence": {"confidence": np.float32([[0.4, 0.95, 0.75, 0.98]])},
+    }
+    params = SemidenseParams(max_error=max_error, calibrated=calibrated)
+    made = compute_semidense(params, {name: inputs[name] for name in params.inputs})
+    assert np.isfinite(made["disparity"]).sum() == kept
+    scale = [0.95, 0.75, 0.4] if calibrated else [0.9, 0.5, 0.2]
+    assert made["R"][0] == np.float32([1, *scale])[kept]
+
+
+def test_pixels_that_tie_are_kept_together_or_not_at_all() -> None:
+    disparity, probability = np.zeros((1, 4)), np.array([[0.9, 0.6, 0.6, 0.6]])
+    assert threshold_for_error(0.26, disparity, probability) == 0.9, "0.25 of two, but there are three such"
+    assert threshold_for_error(0.35, disparity, probability) == 0.6
+    assert threshold_for_error(0.35, disparity, np.full((1, 4), N)) == 1
+
+
+def test_a_harder_map_keeps_less_for_the_same_error() -> None:
+    easy = np.linspace(0.5, 1, 1000)[None]
+    assert threshold_for_error(0.1, easy, easy) < threshold_for_error(0.1, easy, easy - 0.2)
 
 
 @pytest.mark.parametrize("density", [0, 1.5, N])

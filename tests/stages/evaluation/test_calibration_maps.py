@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stages.evaluation.calibration_declaration import BINS, MAPS
-from stages.evaluation.calibration_maps import FITS, brier_score, calibrate, cross_validate, map_threshold
+from stages.evaluation.calibration_maps import FITS, brier_score, calibrate, cross_validate
 from stages.evaluation.calibration_table import EDGES, Table, probability
 
 CENTRES = (EDGES[1:] + EDGES[:-1]) / 2
@@ -85,11 +85,3 @@ def test_no_map_changes_nothing_and_the_order_stays() -> None:
     assert mapped.dtype == np.float32
     assert (np.diff(mapped[:-1]) >= 0).all() and np.isnan(mapped[-1])
     assert mapped[3] == pytest.approx(probability(np.array([-0.4]))[0], abs=0.01)
-
-
-def test_a_threshold_is_mapped_as_a_confidence_is() -> None:
-    mapped = FITS["isotonic"](OVERSURE)
-    confidence = np.linspace(0, 1, 300, dtype=np.float32)
-    for R in (0.3, 0.9, 0.99):
-        kept = calibrate(confidence, mapped) >= np.float32(map_threshold(R, mapped))
-        assert np.array_equal(kept, confidence >= np.float32(R))

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from stages.evaluation.calibration_declaration import BINS, LARGEST
-from stages.evaluation.calibration_table import EDGES, Table, choices, choose, log_odds, probability, tally
-from stages.stage import StageError
+from stages.evaluation.calibration_table import Table, choices, log_odds, outcome, probability, tally
 
 N = np.nan
 HALF = BINS // 2
@@ -61,35 +60,32 @@ def test_the_counts_are_those_of_filtering_at_each_edge() -> None:
         assert choice.error == pytest.approx((error[kept] > 1).mean())
 
 
-def test_the_smallest_threshold_that_keeps_the_error_by_hand() -> None:
-    #                      R = 0: 25 % wrong         above 0.5: 1 of 5      above the next edge: none of 2
-    given = table({10: (1, 1), HALF: (2, 1), HALF + 1: (3, 0)})
-    assert choose(given, 0.25).R == 0
-    above_the_wrong_one, above_all_wrong = probability(EDGES[[11, HALF + 1]])
-    assert np.isclose(choose(given, 0.2).R, above_the_wrong_one)
-    tight = choose(given, 0.1)
-    assert (tight.error, tight.kept, tight.scenes) == (0, 3 / 8, 1)
-    assert np.isclose(tight.R, above_all_wrong)
+def test_a_wanted_error_by_hand() -> None:
+    """Of bins that are right with 0.5, 0.8 and 1 the expected error says how far down to go, scene by scene."""
+    mapped = np.full(BINS + 1, 50.0)
+    mapped[: HALF + 1] = np.log(0.8 / 0.2)
+    mapped[:11] = 0.0
+    easy, hard = {5: (1, 1), 20: (2, 0), HALF + 1: (6, 0)}, {5: (0, 8), 20: (1, 1)}
+    found = outcome(table(easy, hard), mapped, 0.21)
+    # Easy: 1.4 of 10 are expected to be wrong, so all are kept; of the hard one, 0.4 of its two surer pixels.
+    assert (found.error, found.kept, found.scenes) == (pytest.approx((0.1 + 0.5) / 2), pytest.approx((1 + 0.2) / 2), 2)
+    strict = outcome(table(easy, hard), mapped, 0.1)
+    assert (strict.error, strict.kept) == (0, pytest.approx(0.8 / 2)), "the hard scene keeps nothing"
 
 
-def test_every_scene_weighs_the_same() -> None:
-    given = table({HALF: (1000, 0)}, {HALF: (1, 1)})
-    assert choose(given, 0.26).error == 0.25
-    with pytest.raises(StageError, match="the least over 2 training scenes that the network had not seen is 25 %"):
-        choose(given, 0.2)
+def test_without_a_sure_pixel_nothing_is_kept() -> None:
+    found = outcome(table({HALF: (9, 1)}), np.zeros(BINS + 1), 0.1)
+    assert found.kept == 0 and np.isnan(found.error)
+    assert found.words == "in 1 training scenes that the networks had not seen no pixel was sure enough for that error"
 
 
-def test_a_threshold_counts_only_while_every_scene_keeps_something() -> None:
-    given = table({HALF: (9, 1), HALF + 5: (10, 0)}, {HALF: (10, 0)})
-    with pytest.raises(StageError, match=r"no R keeps the error to 1 %: the least .* is 2\.5 %, at R = 0\.000"):
-        choose(given, 0.01)
+def test_the_words_say_what_the_wish_came_to() -> None:
+    given = table({HALF: (49, 1)})
+    assert outcome(given, np.full(BINS + 1, 4.0), 0.05).words == (
+        "in 1 training scenes that the networks had not seen the same wish kept 100 % of the pixels, 2 % of them "
+        "wrong by more than 1 px"
+    )
 
 
-def test_the_words_say_what_the_choice_rests_on() -> None:
-    expected = "2 % of the pixels kept were wrong by more than 1 px in 1 training scenes that the network had not seen"
-    assert choose(table({HALF: (49, 1)}), 0.05).words == expected
-
-
-def test_a_scene_without_truth_tells_no_error() -> None:
-    with pytest.raises(StageError, match="a scene without any pixel of known truth"):
-        choose(table({HALF: (1, 0)}, {}), 0.5)
+def test_a_scene_without_truth_keeps_nothing() -> None:
+    assert outcome(table({HALF: (1, 0)}, {}), np.full(BINS + 1, 4.0), 0.5).kept == 0.5
