@@ -80,7 +80,9 @@ def _volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: rang
 
 
 def _guided_volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float16]:
-    params = CostVolumeParams(d_min=disparities[0], d_max=disparities[-1], mode="guided", precision=resolve("auto"))
+    params = CostVolumeParams(
+        d_min=disparities[0], d_max=disparities[-1], mode="guided", precision=resolve("auto", transformed=True)
+    )
     side = Side(params, channels(left, right), range(left.shape[0]), shipped_nets())
     side()
     return side.volume

@@ -1,4 +1,4 @@
-"""How far bfloat16 is from float32: raw error, changed disparities and costs, on the same rows of the same scenes.
+"""How far bfloat16 is from float32, and how fast each is: error, disparities, costs and time on the same rows.
 
     python -m benchmarks.precision [DATASET] [--rows N] [--json FILE]
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.harness import timed
 from datasets import SceneSource, open_dataset
 from pipeline.shipped import read_shipped_weights
 from stages.disparity import winner_take_all
@@ -27,16 +28,18 @@ from stages.transforms.channels import channels
 
 
 def measure(scene: SceneSource, net: MatchingNet, rows: int) -> dict[str, Any]:
-    """Return raw error (> 1 px, nonocc, %) in both precisions, changed disparities and the cost difference."""
+    """Return raw error (> 1 px, nonocc, %) and time in both precisions, changed disparities and cost difference."""
     block, truth, mask = middle_rows(scene, rows)
     disparities = range(scene.disparities.minimum, scene.disparities.maximum + 1)
     costs = {precision: block_costs(net, block, disparities, precision) for precision in ("float32", "bfloat16")}
     maps = {precision: winner_take_all(cost, disparities.start) for precision, cost in costs.items()}
+    seconds = {precision: timed(lambda p=precision: block_costs(net, block, disparities, p)) for precision in costs}
     changed = np.abs(maps["bfloat16"] - maps["float32"])[mask]
     return {
         "scene": scene.name,
         "pixels": int(mask.sum()),
         **{f"raw_bad_{precision}": raw_bad(made, truth, mask, 1.0) for precision, made in maps.items()},
+        **{f"seconds_{precision}": taken for precision, taken in seconds.items()},
         "changed_percent": 100 * float((changed > 0).mean()),
         "changed_over_1px_percent": 100 * float((changed > 1).mean()),
         "largest_cost_difference": float(np.nanmax(np.abs(costs["bfloat16"] - costs["float32"]))),
@@ -73,7 +76,7 @@ def compare(
     table = Table("scene", *mean, box=None)
     for row in [*found, {"scene": "mean"} | mean]:
         table.add_row(row["scene"], *(f"{row[name]:.4g}" for name in mean))
-    Console(width=160).print(table)
+    Console(width=200).print(table)
     if out:
         out.write_text(
             json.dumps({"name": "precision", "figures": mean, "scenes": found, "fast_bfloat16": fast_bfloat16()})

@@ -97,7 +97,7 @@ def raw_error(result: Result, scene: SceneSource, rows: int, params: CostVolumeP
     padded = np.pad(views, ((0, 0), (0, 0), (margin, margin), (margin, margin)), mode="edge")
     given = {net: {"parameters": result.open(net)["parameters"].values} for net in params.inputs[1:]}
     given["channels"] = {"channels": padded[:, :, first : first + rows + 2 * margin]}
-    own = {"d_min": found.minimum, "d_max": found.maximum, "precision": resolve("auto")}
+    own = {"d_min": found.minimum, "d_max": found.maximum, "precision": resolve("auto", transformed=True)}
     made = winner_take_all(compute_costs(params.model_copy(update=own), given)["cost"], found.minimum)
     truth = result.open("truth", scene.name).isel(y=slice(first, first + rows))
     return raw_bad(made, truth["disparity"].values, truth["nonocc"].values, THRESHOLD)

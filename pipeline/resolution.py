@@ -17,7 +17,7 @@ def resolved(params: Params, scene: SceneSource | None) -> Params:
     if scene:
         _require_within(params, scene)
     if hasattr(params, "precision"):
-        update["precision"] = resolve(params.precision)
+        update["precision"] = resolve(params.precision, transformed=getattr(params, "transformed", False))
     if scene and getattr(params, "d_min", 0) is None:
         update["d_min"] = scene.disparities.minimum
     if scene and getattr(params, "d_max", 0) is None:

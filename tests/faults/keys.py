@@ -93,7 +93,9 @@ def _settings(tally: Tally) -> None:
 def _may_matter(section: str, name: str, value: object) -> bool:
     """Return whether a result may depend on a setting; the default precision is the one that this CPU is fast in."""
     if name == "precision":
-        return resolve(str(value)) != resolve("auto")  # type: ignore[arg-type]
+        transformed = getattr(getattr(Config(), section), "transformed", False)
+        usual = resolve("auto", transformed=transformed)
+        return resolve(str(value), transformed=transformed) != usual  # type: ignore[arg-type]
     if section == "costvolume" and name == "votes":
         return False  # of the guided volume only
     return section in PRODUCTS and name != "checkpoint_steps"

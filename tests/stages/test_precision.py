@@ -5,42 +5,43 @@ import pytest
 import torch
 
 from stages import precision
-from stages.precision import autocast, fast_bfloat16, resolve
+from stages.precision import autocast, cpu_flags, fast_bfloat16, resolve
 
 
 @pytest.fixture(autouse=True)
 def _asked_again() -> Iterator[None]:
-    fast_bfloat16.cache_clear()
+    cpu_flags.cache_clear()
     yield
-    fast_bfloat16.cache_clear()
+    cpu_flags.cache_clear()
 
 
 @pytest.mark.parametrize(
-    ("cpuinfo", "fast"),
+    ("cpuinfo", "plain", "transformed"),
     [
-        pytest.param("flags\t\t: fpu avx512f avx512_bf16 amx_tile\n", True, id="AVX512-BF16"),
-        pytest.param("processor: 0\nflags : amx_bf16 amx_tile\n", True, id="AMX"),
-        pytest.param("flags : avx2 avx512f\n", False, id="neither"),
-        pytest.param("flags : avx512_bf16x noamx_bf16\n", False, id="a flag is a whole word"),
-        pytest.param("model name : avx512_bf16\nflags : avx2\n", False, id="only the flags count"),
-        pytest.param("Features : asimd bf16\n", False, id="another architecture"),
-        pytest.param(None, False, id="no such file"),
+        pytest.param("flags\t\t: fpu avx512f avx512_bf16 amx_tile\n", True, False, id="AVX512-BF16"),
+        pytest.param("processor: 0\nflags : amx_bf16 amx_tile\n", True, True, id="AMX"),
+        pytest.param("flags : avx2 avx512f\n", False, False, id="neither"),
+        pytest.param("flags : avx512_bf16x noamx_bf16\n", False, False, id="a flag is a whole word"),
+        pytest.param("model name : avx512_bf16\nflags : avx2\n", False, False, id="only the flags count"),
+        pytest.param("Features : asimd bf16\n", False, False, id="another architecture"),
+        pytest.param(None, False, False, id="no such file"),
     ],
 )
 def test_auto_is_what_the_cpu_is_fast_at(
-    cpuinfo: str | None, fast: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    cpuinfo: str | None, plain: bool, transformed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "cpuinfo"
     if cpuinfo is not None:
         file.write_text(cpuinfo)
     monkeypatch.setattr(precision, "_CPUINFO", file)
-    assert fast_bfloat16() is fast
-    assert resolve("auto") == ("bfloat16" if fast else "float32")
+    assert (fast_bfloat16(), fast_bfloat16(transformed=True)) == (plain, transformed)
+    assert resolve("auto") == ("bfloat16" if plain else "float32")
+    assert resolve("auto", transformed=True) == ("bfloat16" if transformed else "float32")
 
 
 @pytest.mark.parametrize("fast", [False, True])
 def test_what_is_asked_for_is_what_one_gets(fast: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(precision, "fast_bfloat16", lambda: fast)
+    monkeypatch.setattr(precision, "fast_bfloat16", lambda **_: fast)
     assert resolve("float32") == "float32" and resolve("bfloat16") == "bfloat16"
 
 
@@ -56,7 +57,7 @@ def test_what_is_asked_for_is_what_one_gets(fast: bool, monkeypatch: pytest.Monk
 def test_products_inside_the_context_have_its_precision(
     asked: precision.Precision, fast: bool, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(precision, "fast_bfloat16", lambda: fast)
+    monkeypatch.setattr(precision, "fast_bfloat16", lambda **_: fast)
     with autocast(asked):
         assert (torch.ones(2, 2) @ torch.ones(2, 2)).dtype == dtype
     assert (torch.ones(2, 2) @ torch.ones(2, 2)).dtype == torch.float32
