@@ -128,11 +128,14 @@ def print_metrics(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -
     rows = [row for row in rows if row["mask"] == "nonocc"]
     if not rows:
         return
+    swept = len({_swept(row) for row in rows}) > 1
     table = Table("scene", "threshold px", "R", *(HEADINGS[name] for name in FIGURES), "pixels", box=None)
     for column in table.columns[1:]:
         column.justify = "right"
+    if swept:
+        table.add_column("settings")
     for row in [*rows, *mean_rows(rows)]:
-        table.add_row(*_cells(row))
+        table.add_row(*_cells(row), *([escape(_swept(row))] if swept else []))
     console = results()
     console.print(table)
     kinds = ", ".join(sorted(set(masks.values())))
@@ -142,6 +145,12 @@ def print_metrics(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -
         style="dim",
         highlight=False,
     )
+
+
+def _swept(row: Mapping[str, Any]) -> str:
+    """Return the settings of a variant, but for R, which has a column of its own."""
+    settings = str(row.get("variant", "")).split(", ")
+    return ", ".join(each for each in settings if not each.startswith("semidense.R="))
 
 
 def mean_rows(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

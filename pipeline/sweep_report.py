@@ -15,7 +15,7 @@ THRESHOLD_PX = 1.0
 def write_sweep(rows: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
     """Write ``sweep.csv`` with every row and ``sweep.png`` with the curve; return their paths.
 
-    Where no threshold keeps a pixel there is no curve, and no picture.
+    Where no threshold keeps a pixel, or another wish than R decides, there is no curve, and no picture.
 
     Raises:
         UsageError: if the folder cannot be written.
@@ -24,7 +24,7 @@ def write_sweep(rows: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
     table, picture = folder / "sweep.csv", folder / "sweep.png"
     write_rows(rows, table)
     picture.unlink(missing_ok=True)
-    if not any("bad" in row for row in rows):
+    if not any("bad" in row and "R" in row for row in rows):
         return [table]
     save_png(error_curve_figure(rows, threshold=THRESHOLD_PX), picture)
     return [table, picture]

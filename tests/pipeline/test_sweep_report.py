@@ -29,6 +29,22 @@ def test_without_a_pixel_kept_there_is_no_picture(rows: list[dict[str, object]],
     assert not (tmp_path / "sweep.png").exists(), "not the one of an earlier sweep"
 
 
+def test_where_something_else_than_a_threshold_decides_there_is_no_picture(
+    rows: list[dict[str, object]], tmp_path: Path
+) -> None:
+    wished = [{name: value for name, value in row.items() if name != "R"} for row in rows]
+    assert write_sweep(wished, tmp_path) == [tmp_path / "sweep.csv"]
+
+
+def test_a_line_says_which_settings_it_is_of(rows: list[dict[str, object]], capsys: pytest.CaptureFixture[str]) -> None:
+    wishes = ("semidense.max_error=0.01", "semidense.max_error=0.1")
+    print_sweep([row | {"variant": f"semidense.R=0.9, {wish}"} for wish in wishes for row in rows[:4]], {})
+    out = capsys.readouterr().out
+    assert all(wish in out for wish in wishes) and "semidense.R" not in out
+    print_sweep([row | {"variant": f"semidense.R={row['R']}"} for row in rows], {})
+    assert "settings" not in capsys.readouterr().out
+
+
 def test_a_folder_that_cannot_be_written_is_refused(rows: list[dict[str, object]], tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UsageError, match="cannot be written"):
