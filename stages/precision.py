@@ -40,10 +40,13 @@ def resolve(precision: Precision, *, transformed: bool = False) -> Literal["floa
 
 
 def autocast(precision: Precision) -> AbstractContextManager[None]:
-    """Return the context in which convolutions run in ``precision`` (per thread, as torch has it)."""
+    """Return the context in which convolutions run in ``precision`` (per thread, as torch has it).
+
+    Without torch's cache of cast weights: threads share it, and a shard's gradient would take another shard's path.
+    """
     import torch
 
     context: AbstractContextManager[None] = torch.autocast(
-        "cpu", dtype=torch.bfloat16, enabled=resolve(precision) == "bfloat16"
+        "cpu", dtype=torch.bfloat16, enabled=resolve(precision) == "bfloat16", cache_enabled=False
     )
     return context

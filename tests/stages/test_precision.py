@@ -61,3 +61,9 @@ def test_products_inside_the_context_have_its_precision(
     with autocast(asked):
         assert (torch.ones(2, 2) @ torch.ones(2, 2)).dtype == dtype
     assert (torch.ones(2, 2) @ torch.ones(2, 2)).dtype == torch.float32
+
+
+def test_threads_share_no_cast_weights() -> None:
+    """Else two shards of a step would race for a cast, and a training could end in other bits."""
+    with autocast("bfloat16"):
+        assert not torch.is_autocast_cache_enabled()
