@@ -1,7 +1,7 @@
 """How much the map's agreement should weigh in the confidence: ``python -m benchmarks.agreement DATASET``.
 
-The training scenes are scored as the calibration scores them, each by an evaluation-Net that has not seen it
-(``make calibration`` makes the same products). For each window and weight the table has the mean AUC, and below it
+The training scenes are matched and scored as for the calibration, each by networks that have not seen it (``make
+calibration`` makes the same products). For each window and weight the table has the mean AUC, and below it
 the typical agreement: the geometric mean over the right pixels. So none of the numbers comes from a test scene.
 """
 
@@ -69,7 +69,8 @@ def main(
 
 def _scored(result: Result, scene: str) -> tuple[NDArray[np.float32], Values, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return a scene's raw map; of its pixels that count the net's log-odds and which are right; and where they are."""
-    disparity = result.open("disparity", scene)["disparity"].values
+    scored = result.find("confidence", scene).step.inputs["disparity"][0]  # others are of networks that have seen it
+    disparity = result.store.arrays(result.made[scored].key)["disparity"][...]
     truth = result.open("truth", scene)
     visible = truth["nonocc"].values & np.isfinite(truth["disparity"].values)
     network = result.open("confidence", scene)["network"].values.astype(np.float64)[visible]

@@ -95,7 +95,8 @@ def test_the_choice_of_the_agreement_is_a_table(
     result = run(Task(SPEC, settings=SETTINGS, train=True, cache=cache), "calibration")
     areas = []
     for scene in ("train-0", "train-1"):
-        truth, disparity = result.open("truth", scene), result.open("disparity", scene)["disparity"].values
+        truth, scored = result.open("truth", scene), result.find("confidence", scene).step.inputs["disparity"][0]
+        disparity = result.store.arrays(result.made[scored].key)["disparity"][...]
         counted = truth["nonocc"].values & np.isfinite(truth["disparity"].values)
         right = np.abs(disparity - truth["disparity"].values) <= 1
         areas.append(auc(result.open("confidence", scene)["network"].values[counted], right[counted]))

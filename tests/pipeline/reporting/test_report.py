@@ -66,7 +66,7 @@ def test_training_scenes_are_not_reported_on(page: str) -> None:
 
 
 def test_what_is_not_cached_is_left_out(trained_task: Task, own_cache: Path, tmp_path: Path) -> None:
-    task = replace(trained_task, cache=own_cache, settings=[*trained_task.settings, "confidence.precision=bfloat16"])
+    task = replace(trained_task, cache=own_cache, settings=[*trained_task.settings, "confidence.window=9"])
     page = report(task, tmp_path / "r.html").read_text()
     assert headings(page) == ["What ran", "Scenes", "Networks", "Configuration and versions"]
     assert "raw disparity, before filtering" in page
