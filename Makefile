@@ -2,8 +2,11 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
-MODE ?= exact
-OF_MODE := $(if $(filter exact,$(MODE)),,.$(MODE))
+MODE := exact
+OF_MODE := $(if $(filter guided,$(MODE)),.guided)
+ifeq ($(filter exact guided,$(MODE)),)
+$(error MODE=$(MODE): the weights that come with the package are of exact and of guided volumes)
+endif
 
 .PHONY: demo test lint train descriptors evaluation calibration bench faults wheel clean
 

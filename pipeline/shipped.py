@@ -19,8 +19,8 @@ WEIGHTS = {
     for product, stage in STAGES.items()
     if product in ("matching_net", "descriptor_net", "evaluation_net", "calibration")
 }
-_OF_A_MODE = ("evaluation_net", "calibration")
-"""Products that are learnt from raw maps, and so belong to a kind of volume."""
+_LEARNT_FROM_MAPS = ("evaluation_net", "calibration")
+"""Products of which those for guided volumes are others: the errors of such maps hang together."""
 _HOW = {
     "calibration": "no calibration comes with this installation: a wanted error and calibrated probabilities need one; "
     "`make calibration DATA=DIR` makes it from Middlebury's training scenes"
@@ -34,7 +34,7 @@ def weights_name(product: str, mode: Mode) -> str:
     >>> weights_name("evaluation_net", "guided"), weights_name("matching_net", "guided")
     ('evaluation_net.guided', 'matching_net')
     """
-    return f"{product}.{mode}" if product in _OF_A_MODE and mode != "exact" else product
+    return f"{product}.guided" if mode == "guided" and product in _LEARNT_FROM_MAPS else product
 
 
 def weights_file(name: str) -> Traversable:

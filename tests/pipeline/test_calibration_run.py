@@ -4,7 +4,6 @@ import json
 from collections.abc import Callable, Iterator
 from importlib import resources
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -192,7 +191,7 @@ def test_the_bins_are_wide_enough_for_both_ends() -> None:
     assert EDGES.size == BINS + 1
 
 
-@pytest.mark.parametrize("mode", get_args(Mode))
+@pytest.mark.parametrize("mode", ["exact", "guided"])
 def test_the_shipped_table_was_made_for_the_shipped_networks(mode: Mode) -> None:
     about = {}
     for product in ("evaluation_net", "calibration"):

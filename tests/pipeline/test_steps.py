@@ -88,7 +88,7 @@ def test_a_training_can_rest_on_networks_that_come_with_the_package() -> None:
     assert "shipped" not in find(made, "evaluation_net", SPLIT).settings
 
 
-@pytest.mark.parametrize(("mode", "ending"), [("exact", ""), ("guided", ".guided"), ("fast", ".fast")])
+@pytest.mark.parametrize(("mode", "ending"), [("exact", ""), ("guided", ".guided"), ("fast", "")])
 def test_raw_maps_of_a_mode_are_scored_by_what_was_learnt_from_such(mode: str, ending: str) -> None:
     made = graph(f"costvolume.mode={mode}", "semidense.max_error=0.1", upto="semidense")
     used = {step.argument for step in made.steps.values() if "shipped" in step.settings}
