@@ -1,4 +1,4 @@
-"""The scenes to train on; and their folds, so that each can be scored by a network that has not seen it."""
+"""The scenes to train on; and their folds, so that each can be scored by networks that have not seen it."""
 
 from collections.abc import Sequence
 from typing import TypeVar

@@ -1,4 +1,4 @@
-"""What a confidence is worth: how often pixels of that confidence are right in scenes that the network has not seen."""
+"""What a confidence is worth: how often pixels of that confidence are right in scenes that no network has seen."""
 
 import numpy as np
 
