@@ -21,11 +21,6 @@ WEIGHTS = {
 }
 _LEARNT_FROM_MAPS = ("evaluation_net", "calibration")
 """Products of which those for guided volumes are others: the errors of such maps hang together."""
-_HOW = {
-    "calibration": "no calibration comes with this installation: a wanted error and calibrated probabilities need one; "
-    "`make calibration DATA=DIR` makes it from Middlebury's training scenes"
-}
-"""What to do about a missing file, where it is not to train."""
 
 
 def weights_name(product: str, mode: Mode) -> str:
@@ -45,8 +40,7 @@ def weights_file(name: str) -> Traversable:
     """
     file = resources.files("stages") / "weights" / f"{name}.safetensors"
     if not file.is_file():
-        missing = f"no weights for {name} come with this installation: train them with --train"
-        raise StageError(_HOW.get(_product(name), missing))
+        raise StageError(_missing(name))
     return file
 
 
@@ -68,6 +62,18 @@ def read_shipped_table(name: str, _: Inputs) -> dict[str, Array]:
     from stages.weights.tables import read_table
 
     return read_table(weights_file(name).read_bytes())
+
+
+def _missing(name: str) -> str:
+    """Return what is missing and what to do about it."""
+    product, _, mode = name.partition(".")
+    if product != "calibration":
+        return f"no weights for {name} come with this installation: train them with --train"
+    of_mode = f" MODE={mode}" if mode else ""
+    return (
+        "no calibration of such volumes comes with this installation: a wanted error and calibrated probabilities need "
+        f"one; `make calibration DATA=DIR{of_mode}` makes it from Middlebury's training scenes"
+    )
 
 
 def _product(name: str) -> str:

@@ -2,14 +2,17 @@
 for (const scene of document.querySelectorAll(".scene")) {
   const slider = scene.querySelector(".zoom input"), told = scene.querySelector(".zoom output");
   const frames = [...scene.querySelectorAll(".frame")];
-  let leader = null, timer = 0;
+  const at = (frame) => `${frame.scrollLeft} ${frame.scrollTop}`;
+  const put = new Map();  // where a frame was last moved to by another, so that its own event of it moves nothing
 
   function follow(frame) {
-    if (leader && leader !== frame) return;
-    leader = frame;
-    clearTimeout(timer);
-    timer = setTimeout(() => { leader = null; }, 120);
-    for (const other of frames) if (other !== frame) other.scrollTo(frame.scrollLeft, frame.scrollTop);
+    if (put.get(frame) === at(frame)) return;
+    put.delete(frame);
+    for (const other of frames) {
+      if (other === frame) continue;
+      other.scrollTo(frame.scrollLeft, frame.scrollTop);
+      put.set(other, at(other));
+    }
   }
 
   function zoom(value) {

@@ -146,11 +146,16 @@ def test_an_error_that_no_pixel_is_sure_of_keeps_nothing_and_says_so(table: Path
     assert about["R_basis"].startswith("no pixel is sure enough for that error; in 3 training scenes")
 
 
-def test_without_a_table_it_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("name", "command"), [("calibration", "DATA=DIR`"), ("calibration.guided", "DATA=DIR MODE=guided`")]
+)
+def test_without_a_table_it_says_what_to_do(
+    name: str, command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("pipeline.shipped.resources.files", lambda _: tmp_path)
     shipped.weights_digest.cache_clear()
-    with pytest.raises(StageError, match=r"no calibration comes with this installation: .*`make calibration DATA=DIR`"):
-        shipped.weights_digest("calibration")
+    with pytest.raises(StageError, match=f"no calibration of such volumes comes .*`make calibration {command}"):
+        shipped.weights_digest(name)
 
 
 @pytest.mark.parametrize(
