@@ -3,16 +3,17 @@ for (const scene of document.querySelectorAll(".scene")) {
   const slider = scene.querySelector(".zoom input"), told = scene.querySelector(".zoom output");
   const frames = [...scene.querySelectorAll(".frame")];
   const at = (frame) => `${frame.scrollLeft} ${frame.scrollTop}`;
-  const put = new Map();  // where a frame was last moved to by another, so that its own event of it moves nothing
+  const put = new Map();  // where a frame was last put from here, so that its own event of that moves nothing
+
+  function place(frame, x, y) {
+    frame.scrollTo(x, y);
+    put.set(frame, at(frame));
+  }
 
   function follow(frame) {
     if (put.get(frame) === at(frame)) return;
     put.delete(frame);
-    for (const other of frames) {
-      if (other === frame) continue;
-      other.scrollTo(frame.scrollLeft, frame.scrollTop);
-      put.set(other, at(other));
-    }
+    for (const other of frames) if (other !== frame) place(other, frame.scrollLeft, frame.scrollTop);
   }
 
   function zoom(value) {
@@ -22,7 +23,7 @@ for (const scene of document.querySelectorAll(".scene")) {
     scene.style.setProperty("--zoom", value);
     scene.classList.toggle("close", value > 2);
     told.textContent = `${value}x`;
-    for (const each of frames) each.scrollTo(x * value - each.clientWidth / 2, y * value - each.clientHeight / 2);
+    for (const each of frames) place(each, x * value - each.clientWidth / 2, y * value - each.clientHeight / 2);
   }
 
   scene.querySelector(".zoom").hidden = false;

@@ -66,6 +66,22 @@ def test_the_keyboard_zooms_and_moves_all_pictures(look: Callable[..., Seen], ad
     wait_until(seen, f"new Set({places}).size === 1")
 
 
+def test_a_picture_moved_right_after_another_leads_all(look: Callable[..., Seen], address: str) -> None:
+    seen = look(address)
+    page: Any = seen.page
+    page.locator(".zoom input").first.focus()
+    for _ in range(4):
+        page.keyboard.press("ArrowRight")
+    two = "const [first, second] = document.querySelectorAll('.scene .frame');"
+    apart = "first.scrollLeft !== second.scrollLeft"
+    follows = f"for (let n = 0; n < 120 && {apart}; n++) await new Promise(requestAnimationFrame);"
+    back = "const place = first.scrollLeft; first.scrollTo(30, 0); return place;"
+    moved = f"async () => {{ {two} second.scrollTo(60, 0); {follows} {back} }}"
+    assert page.evaluate(moved) == pytest.approx(60, abs=1)
+    places = "[...document.querySelector('.scene').querySelectorAll('.frame')].map((frame) => frame.scrollLeft)"
+    wait_until(seen, f"{places}.every((place) => Math.abs(place - 30) < 1)")
+
+
 def test_print_shows_what_is_folded_and_no_controls(look: Callable[..., Seen], address: str) -> None:
     page: Any = look(address).page
     SCREENS.mkdir(parents=True, exist_ok=True)
