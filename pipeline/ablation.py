@@ -1,11 +1,13 @@
 """What the transforms are worth: matching-Nets that see different channels, trained alike from nothing."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from datasets import Dataset, SceneSource
-from pipeline.api import Task
+from pipeline.api import Result, Task
+from pipeline.comparison_rows import Judged, Row, raw_rows
 from pipeline.config import Config
 from pipeline.steps import Request
+from pipeline.tasks import read_arrays
 
 ABLATION = {
     "gray + rank + companion, trained alike": ("gray", "rank", "companion"),
@@ -23,6 +25,16 @@ def ablation_request(task: Task, dataset: Dataset, training: tuple[SceneSource, 
         for method, channels in ABLATION.items()
     }
     return Request(dataset, configs, "disparity", train=True, training=training, also=("truth",))
+
+
+def ablation_rows(result: Result) -> Iterator[Row]:
+    """Yield the rows of the raw maps of a run of ``ablation_request``."""
+    targets = [(result.made[step_id], variant) for step_id, variant in result.plan.targets]
+    truths = {made.step.scene: made.key for made, _ in targets if made.step.product == "truth"}
+    for made, variant in targets:
+        if made.step.product == "disparity":
+            judged = Judged(made.step.scene, read_arrays(result.store, truths[made.step.scene]))
+            yield from raw_rows(judged, variant, read_arrays(result.store, made.key)["disparity"])
 
 
 def _as_list(channels: Iterable[str]) -> str:

@@ -43,7 +43,11 @@ def compare(
     ] = None,
     without: Annotated[
         list[str] | None,
-        typer.Option("--without", help="Leave out a matcher or measure, such as mc_cnn_accurate; may be repeated."),
+        typer.Option(
+            "--without",
+            help="Leave out a matcher or measure, such as mc_cnn_accurate, or ablation, the networks of fewer "
+            "channels; may be repeated.",
+        ),
     ] = None,
     threshold: Annotated[
         float, typer.Option("--threshold", help="Error in px above which tables and figures call a pixel wrong.")

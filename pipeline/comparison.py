@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datasets import Dataset, open_dataset
-from pipeline.ablation import ABLATION, ablation_request
+from pipeline.ablation import ABLATION, ablation_request, ablation_rows
 from pipeline.api import Result, Task, carry_out
 from pipeline.comparison_rows import (
     OURS,
@@ -64,6 +64,7 @@ LEARNT = ("o1", "ccnn")
 _ALWAYS = ("images", "truth", "disparity", "confidence")
 _SHIPPED = ", shipped weights"
 _UNTRAINED = "needs a training set: name one with --train-on"
+_LEFT_OUT = "left out on request"
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,8 @@ def compare(
         train_on: dataset whose training scenes O1 and CCNN learn from, and on which matching-Nets with different
             channels are trained from nothing, alike; without it, those rows are left out.
         protocols: of ``PROTOCOLS``: the paper's own, by which both networks are trained and tested beside ours.
-        without: products of other matchers and measures that are left out, such as ``mc_cnn_accurate``.
+        without: products of other matchers and measures that are left out, such as ``mc_cnn_accurate``; with
+            ``ablation``, no matching-Nets with different channels are trained.
         watch: as for ``run``.
         scheduler: as for ``run``.
         workers: as for ``run``.
@@ -145,9 +147,9 @@ def compare(
     lenient = [(name, each) for name in protocols for each in protocol_requests(name, task, dataset, training)]
     result = carry_out(task, request, (), watch, scheduler, workers)
     rows = list(_rows(result, experiments))
-    if "raw" in experiments and training:
+    if "raw" in experiments and not _no_ablation(bool(training), without):
         ablation = ablation_request(task, dataset, training)
-        rows += _ablation_rows(carry_out(task, ablation, (), watch, scheduler, workers))
+        rows += ablation_rows(carry_out(task, ablation, (), watch, scheduler, workers))
     for protocol, wanted in lenient:
         trained = carry_out(task, wanted, (), watch, scheduler, workers)
         rows += _named(_rows(trained, experiments), PROTOCOLS[protocol])
@@ -165,7 +167,7 @@ def _require(task: Task, experiments: Sequence[str]) -> None:
 
 
 def _require_others(products: Sequence[str]) -> None:
-    others = sorted({*MATCHERS.values(), *(product for product, _ in MEASURES.values())} - {*_ALWAYS})
+    others = sorted({*MATCHERS.values(), *(product for product, _ in MEASURES.values()), "ablation"} - {*_ALWAYS})
     for product in products:
         if product not in others:
             raise UsageError(f"--without {product}: no such matcher or measure; {nearest(product, others)}")
@@ -190,8 +192,8 @@ def _available(
     reasons = {product: _reason(product, trained, without) for product in wanted.values()}
     products = tuple(product for product, reason in reasons.items() if not reason)
     missing = {method: reasons[product] for method, product in wanted.items() if reasons[product]}
-    if "raw" in experiments:
-        missing |= {} if trained else dict.fromkeys(ABLATION, _UNTRAINED)
+    if "raw" in experiments and (why := _no_ablation(trained, without)):
+        missing |= dict.fromkeys(ABLATION, why)
     if "density" in experiments:
         missing |= dict.fromkeys(NAMED, "in the paper's plot only: its text gives no figure for error against invalid")
     return products, [{"method": method, "why": why} for method, why in missing.items()]
@@ -200,12 +202,17 @@ def _available(
 def _reason(product: str, trained: bool, without: Sequence[str]) -> str:
     """Return why a product is not made; nothing if it is."""
     if product in without:
-        return "left out on request"
+        return _LEFT_OUT
     inputs = (STAGES[name] for name in STAGES[product].inputs if name in STAGES)
     packages = [name for stage in (STAGES[product], *inputs) for name in missing_packages(stage)]
     if packages:
         return f"needs {' and '.join(packages)}: pip install 'semidense-stereo[baselines]'"
     return _UNTRAINED if product in LEARNT and not trained else ""
+
+
+def _no_ablation(trained: bool, without: Sequence[str]) -> str:
+    """Return why no matching-Nets with different channels are trained; nothing if they are."""
+    return _LEFT_OUT if "ablation" in without else "" if trained else _UNTRAINED
 
 
 def _asked(result: Result) -> dict[str, dict[str, Made]]:
@@ -285,12 +292,3 @@ def measure_rows(judged: Judged, products: Mapping[str, Arrays]) -> Iterator[Row
 
 
 _EXPERIMENT = {"raw": _raw, "density": _density, "auc": _auc}
-
-
-def _ablation_rows(result: Result) -> Iterator[Row]:
-    targets = [(result.made[step_id], variant) for step_id, variant in result.plan.targets]
-    truths = {made.step.scene: made.key for made, _ in targets if made.step.product == "truth"}
-    for made, variant in targets:
-        if made.step.product == "disparity":
-            judged = Judged(made.step.scene, read_arrays(result.store, truths[made.step.scene]))
-            yield from raw_rows(judged, variant, read_arrays(result.store, made.key)["disparity"])

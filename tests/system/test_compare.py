@@ -157,6 +157,13 @@ def test_what_is_left_out_is_not_made_and_says_so(task: Task) -> None:
     assert not {*left_out} & {each.step.product for each in made.result.made.values()}
 
 
+def test_without_the_ablation_no_matching_net_is_trained(found: Comparison, task: Task) -> None:
+    made = compare(task, ("raw",), SPEC, without=("ablation",))
+    reasons = {each["method"]: each["why"] for each in made.unavailable}
+    assert {method for method, why in reasons.items() if why == "left out on request"} == set(ABLATION)
+    assert methods(made, "raw") == methods(found, "raw") - set(ABLATION)
+
+
 def test_files_hold_all_rows_and_what_is_quoted(found: Comparison, tmp_path: Path) -> None:
     files = write_comparison(found, tmp_path / "new")
     names = {"comparison.csv", "comparison.json", "raw.png", "auc.png", "density.png", "lighting.png", "texture.png"}
