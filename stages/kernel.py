@@ -1,6 +1,11 @@
 """The one way this package compiles a loop."""
 
+import ast
+import hashlib
+import sys
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import TypeVar, cast
 
 import numba
@@ -16,10 +21,37 @@ def kernel(function: Function) -> Function:
     tiles run side by side in threads. Floating point keeps IEEE rules (NaN compares as false), and nothing
     checks an index: the public function around a kernel checks what it is given.
     """
-    return cast(Function, numba.njit(cache=True, nogil=True)(function))
+    name = function.__qualname__
+    # Numba names the file on disk by this, and compiles anew when the function's own module has changed. The digest
+    # makes it so for the modules that its helpers and constants come from.
+    function.__qualname__ = f"{name}-{_digest(function.__module__)}"
+    compiled = numba.njit(cache=True, nogil=True)(function)
+    function.__qualname__ = name
+    return cast(Function, compiled)
 
 
 def inlined(function: Function) -> Function:
     """Compile a function into each kernel that calls it; called from Python it stays what it is."""
     made: Function = register_jitable(inline="always")(function)
     return made
+
+
+def _digest(module: str) -> str:
+    """Return a digest of the sources of a module and of all that it imports from its top-level package."""
+    found: set[str] = set()
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        if name not in found and name in sys.modules:
+            found.add(name)
+            waiting += (each for each in _source(name)[1] if each.split(".")[0] == module.split(".")[0])
+    return hashlib.sha256(b"".join(_source(name)[0] for name in sorted(found))).hexdigest()[:16]
+
+
+@cache
+def _source(module: str) -> tuple[bytes, tuple[str, ...]]:
+    """Return a module's source and the modules that it imports from."""
+    file = sys.modules[module].__file__
+    source = Path(file).read_bytes() if file else b""
+    imports = (node.module for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom))
+    return source, tuple(name for name in imports if name)
