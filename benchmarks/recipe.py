@@ -6,6 +6,7 @@ scenes. So settings are chosen without a look at the scenes of the final figures
 variant the steps that take as long; the table says how long they took.
 """
 
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -61,6 +62,7 @@ def main(
         errors = {scene.name: raw_error(result, scene, rows, params) for scene in tested}
         found[settings] = {"seconds": seconds, "raw_bad": errors}
         values = (*errors.values(), float(np.mean([*errors.values()])))
+        print(f"{settings}: {values[-1]:.2f} % in the mean", file=sys.stderr)
         table.add_row(settings, f"{seconds:.0f}", *(f"{value:.2f}" for value in values))
     names = [scene.name for scene in tested]
     write("recipe", {"held": names, "rows": rows, "scenes": len(learnt), "variants": found})
@@ -97,7 +99,7 @@ def raw_error(result: Result, scene: SceneSource, rows: int, params: CostVolumeP
     padded = np.pad(views, ((0, 0), (0, 0), (margin, margin), (margin, margin)), mode="edge")
     given = {net: {"parameters": result.open(net)["parameters"].values} for net in params.inputs[1:]}
     given["channels"] = {"channels": padded[:, :, first : first + rows + 2 * margin]}
-    own = {"d_min": found.minimum, "d_max": found.maximum, "precision": resolve("auto", transformed=True)}
+    own = {"d_min": found.minimum, "d_max": found.maximum, "precision": resolve("auto")}
     made = winner_take_all(compute_costs(params.model_copy(update=own), given)["cost"], found.minimum)
     truth = result.open("truth", scene.name).isel(y=slice(first, first + rows))
     return raw_bad(made, truth["disparity"].values, truth["nonocc"].values, THRESHOLD)
