@@ -76,13 +76,11 @@ def main(
 
 def _volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float32]:
     net = net_from_parameters(read_shipped_weights("matching_net", {})["parameters"], 3)
-    return cost_volume(net, channels(left, right), disparities)
+    return cost_volume(net, channels(left, right), disparities, "auto")
 
 
 def _guided_volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float16]:
-    params = CostVolumeParams(
-        d_min=disparities[0], d_max=disparities[-1], mode="guided", precision=resolve("auto", transformed=True)
-    )
+    params = CostVolumeParams(d_min=disparities[0], d_max=disparities[-1], mode="guided", precision=resolve("auto"))
     side = Side(params, channels(left, right), range(left.shape[0]), shipped_nets())
     side()
     return side.volume
@@ -90,7 +88,7 @@ def _guided_volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparitie
 
 def _fast_volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float32]:
     net = descriptor_net_from_parameters(read_shipped_weights("descriptor_net", {})["parameters"], 3)
-    return fast_cost_volume(net, channels(left, right), disparities)
+    return fast_cost_volume(net, channels(left, right), disparities, "auto")
 
 
 def _against_accurate(scene: Scene, crop: tuple[int, int, int], pairs: int) -> list[Ratio]:

@@ -83,9 +83,7 @@ def measure(scene: SceneSource, nets: Nets, rows: int, votes: int) -> Outcome:
     views, low, high = channels(loaded.left, loaded.right), scene.disparities.minimum, scene.disparities.maximum
     sides = [
         Side(
-            CostVolumeParams(
-                d_min=low, d_max=high, mode=mode, precision=resolve("auto", transformed=True), votes=votes
-            ),
+            CostVolumeParams(d_min=low, d_max=high, mode=mode, precision=resolve("auto"), votes=votes),
             views,
             taken,
             nets,

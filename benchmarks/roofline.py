@@ -3,7 +3,7 @@
 The limits: the rate of bare convolutions of the network's two large shapes, also with 8-bit integers, and the rate of
 bare batched matrix products of the shapes that the transformed convolutions multiply (see
 ``stages.matching.transformed``). The stage counts whole: reading the channels from the cache, everything between,
-writing and publishing. All run on one thread.
+writing and publishing, in the precision that it has on this CPU. All run on one thread.
 """
 
 import tempfile
@@ -17,7 +17,7 @@ from torch.nn import functional
 from benchmarks.harness import PAIRS, Ratio, report, timed
 from pipeline.api import Task, run
 from stages.matching.cost_volume import valid_columns
-from stages.precision import fast_bfloat16
+from stages.precision import dtype_of, fast_bfloat16
 from stages.threads import one_thread
 
 HEIGHT, WIDTH, DISPARITIES = 128, 256, 40
@@ -70,10 +70,10 @@ def integer_convolutions() -> tuple[Callable[[], None], float]:
     return work, 2 * (36 * 68 * 9 * 384 * 64 + 32 * 64 * 25 * 64 * 128)
 
 
-def bare_products() -> tuple[Callable[[], None], float]:
+def bare_products(dtype: torch.dtype) -> tuple[Callable[[], None], float]:
     """Return the batched matrix products of a block, and their operations."""
-    joined, features = torch.randn(36, TILES, 128), torch.randn(64, TILES, 64)
-    first, second = torch.randn(36, 128, 64), torch.randn(64, 64, 128)
+    joined, features = torch.randn(36, TILES, 128, dtype=dtype), torch.randn(64, TILES, 64, dtype=dtype)
+    first, second = torch.randn(36, 128, 64, dtype=dtype), torch.randn(64, 64, 128, dtype=dtype)
 
     def work() -> None:
         for _ in range(3):  # a product a channel
@@ -97,10 +97,10 @@ def main() -> None:
     dtypes = [torch.float32, *([torch.bfloat16] if fast_bfloat16() else [])]
     convolutions = {str(dtype): bare_convolutions(dtype) for dtype in dtypes}
     convolutions["int8"] = integer_convolutions()
-    products = bare_products()
+    products = bare_products(dtype_of("auto"))
     shares: dict[str, list[float]] = {}
     with tempfile.TemporaryDirectory() as folder:
-        task = Task(SCENE, cache=Path(folder), settings=["costvolume.precision=float32"])
+        task = Task(SCENE, cache=Path(folder))
         run(task, "costvolume", workers=1)
         for _ in range(PAIRS):
             speed = cells / timed(lambda: run(task, "costvolume", forced=["costvolume"], workers=1))

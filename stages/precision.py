@@ -3,7 +3,10 @@
 from contextlib import AbstractContextManager
 from functools import cache
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    import torch
 
 Precision = Literal["auto", "float32", "bfloat16"]
 """``auto`` becomes one of the other two before anything is computed, and it is that one that enters the key."""
@@ -25,8 +28,8 @@ def fast_bfloat16(*, transformed: bool = False) -> bool:
     """Return whether this CPU is faster in bfloat16 than in float32; False where it cannot be told.
 
     Args:
-        transformed: of convolutions that in float32 run in a transformed domain. With a third of the products they are
-            as fast as plain ones with AVX512-BF16; matrix units (AMX) alone outrun them.
+        transformed: of convolutions that run in a transformed domain in float32 alone. With a third of the products
+            they are as fast as plain ones with AVX512-BF16; matrix units (AMX) alone outrun them.
     """
     fast = _MATRIX_UNITS if transformed else _MATRIX_UNITS | _INSTRUCTIONS
     return not fast.isdisjoint(cpu_flags())
@@ -37,6 +40,13 @@ def resolve(precision: Precision, *, transformed: bool = False) -> Literal["floa
     if precision == "auto":
         return "bfloat16" if fast_bfloat16(transformed=transformed) else "float32"
     return precision
+
+
+def dtype_of(precision: Precision) -> "torch.dtype":
+    """Return the dtype of what is multiplied in a precision."""
+    import torch
+
+    return torch.bfloat16 if resolve(precision) == "bfloat16" else torch.float32
 
 
 def autocast(precision: Precision) -> AbstractContextManager[None]:

@@ -22,7 +22,7 @@ from stages.matching.guided import padded_guided_costs
 from stages.matching.net import SIDES, MatchingNet, net_from_parameters, require_views
 from stages.matching.transformed import TransformedNet, is_transformable, run_blocks
 from stages.matching.winograd import TILE
-from stages.precision import Precision, autocast
+from stages.precision import Precision, autocast, dtype_of
 from stages.stage import Inputs, require_shape
 from stages.threads import one_thread
 
@@ -80,9 +80,9 @@ def padded_cost_volume(
     volume = np.full((height, width, len(disparities)), np.nan, np.float32)
     keep_freed_memory()
     one_thread()
-    with torch.inference_mode(), autocast(precision):
+    with torch.inference_mode():
         views = torch.from_numpy(np.ascontiguousarray(channels))
-        costs = _transformed(net, views) if is_transformable(net, precision) else _direct(net, views)
+        costs = (_transformed if is_transformable(net) else _direct)(net, views, precision)
         # Disparities go innermost: a block of the left view, and what it meets in the right, stay in the cache.
         for y, block in product(range(0, height, ROWS), range(0, width, COLUMNS)):
             for index, disparity in enumerate(disparities):
@@ -93,31 +93,34 @@ def padded_cost_volume(
     return volume
 
 
-def _direct(net: MatchingNet, views: Tensor) -> Costs:
-    """Return costs by the network's own convolutions, in whichever precision it runs."""
-    left, right = (
-        net.embed(view[None], side).contiguous(memory_format=torch.channels_last)
-        for view, side in zip(views, SIDES, strict=True)
-    )
+def _direct(net: MatchingNet, views: Tensor, precision: Precision) -> Costs:
+    """Return costs by the network's own convolutions."""
+    with autocast(precision):
+        left, right = (
+            net.embed(view[None], side).contiguous(memory_format=torch.channels_last)
+            for view, side in zip(views, SIDES, strict=True)
+        )
     reach = 2 * RADIUS - 4  # what conv3 and the head still take from each side together
 
     def costs(y: int, x: int, columns: int, disparity: int) -> NDArray[np.float32]:
         rows = slice(y, y + ROWS + reach)
         one = left[..., rows, x : x + columns + reach]
         other = right[..., rows, x - disparity : x - disparity + columns + reach]
-        made: NDArray[np.float32] = net.log_odds(functional.relu(one + other))[0].numpy()
+        with autocast(precision):
+            made: NDArray[np.float32] = net.log_odds(functional.relu(one + other))[0].numpy()
         return made
 
     return costs
 
 
-def _transformed(net: MatchingNet, views: Tensor) -> Costs:
-    """Return costs by transformed convolutions: the same numbers in float32, by fewer products."""
+def _transformed(net: MatchingNet, views: Tensor, precision: Precision) -> Costs:
+    """Return costs by transformed convolutions: the same numbers, by fewer products."""
     height = views.shape[2] - 2 * RADIUS
-    transformed = TransformedNet.of(net)
+    dtype = dtype_of(precision)
+    transformed = TransformedNet.of(net, dtype)
     left, right = (
         # The filters of a pixel lie side by side; the last tile may reach over the edge.
-        functional.pad(net.embed_layers(view[None], side).permute(0, 2, 3, 1), (0, 0, 0, TILE, 0, TILE))
+        functional.pad(net.embed_layers(view[None], side).permute(0, 2, 3, 1).to(dtype), (0, 0, 0, TILE, 0, TILE))
         for view, side in zip(views, SIDES, strict=True)
     )
 

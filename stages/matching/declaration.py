@@ -47,7 +47,7 @@ class MatchingSamplesParams(Params):
 class MatchingNetParams(Schedule):
     """The matching-Net and how it is trained."""
 
-    transformed: ClassVar[bool] = True  # in float32, which decides what `precision=auto` is
+    transformed: ClassVar[bool] = True  # its training in float32, which decides what `precision=auto` is
     steps: int = Field(4500, ge=1, description="optimiser steps")
     head: Head = Field("compact", description="hidden layers: 128 units, or the paper's 1600 and 128")
     batch: int = Field(
@@ -62,7 +62,7 @@ class MatchingNetParams(Schedule):
 class DescriptorNetParams(Schedule):
     """The descriptor-Net of guided and fast volumes and how it is trained."""
 
-    transformed: ClassVar[bool] = True  # in float32, which decides what `precision=auto` is
+    transformed: ClassVar[bool] = True  # its training in float32, which decides what `precision=auto` is
     steps: int = Field(9000, ge=1, description="optimiser steps")
     peak_rate: float = Field(0.008, gt=0, description="highest learning rate")
     batch: int = Field(
@@ -77,7 +77,6 @@ class DescriptorNetParams(Schedule):
 class CostVolumeParams(Params):
     """Which cells are computed, and in which arithmetic."""
 
-    transformed: ClassVar[bool] = True  # in float32, which decides what `precision=auto` is
     d_min: int | None = Field(None, description="smallest disparity, px; default: the scene's own")
     d_max: int | None = Field(None, description="largest disparity, px; default: the scene's own")
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")

@@ -14,7 +14,7 @@ from stages.allocator import keep_freed_memory
 from stages.matching.declaration import REACH
 from stages.matching.descriptor_net import DescriptorNet
 from stages.matching.transformed_descriptors import kernels_of, transformed_descriptors
-from stages.precision import Precision, autocast
+from stages.precision import Precision, dtype_of
 from stages.stage import StageError, require_shape
 from stages.threads import one_thread
 
@@ -72,12 +72,8 @@ def padded_fast_costs(
 
 def _descriptors(net: DescriptorNet, views: Tensor, precision: Precision) -> list[Tensor]:
     """Return the descriptors of each padded view: (y, x, number)."""
-    if precision == "float32":
-        kernels = kernels_of(net)
-        return [transformed_descriptors(net, kernels, view) for view in views]
-    with autocast(precision):
-        made: Tensor = net(views.contiguous(memory_format=torch.channels_last))
-    return list(made.permute(0, 2, 3, 1).contiguous())
+    kernels = kernels_of(net, dtype_of(precision))
+    return [transformed_descriptors(net, kernels, view) for view in views]
 
 
 def diagonals(products: Tensor, count: int) -> Tensor:

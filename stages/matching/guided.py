@@ -19,7 +19,7 @@ from stages.matching.fast import padded_fast_costs
 from stages.matching.net import MatchingNet, require_views
 from stages.matching.sparse import BATCH, judge_tiles
 from stages.matching.winograd import TILE
-from stages.precision import Precision, autocast
+from stages.precision import Precision
 from stages.stage import require_shape
 from stages.threads import one_thread
 
@@ -75,7 +75,7 @@ def padded_guided_costs(
     tiles = volume.reshape(chosen.shape[0], TILE, chosen.shape[1], TILE, len(disparities))
     keep_freed_memory()
     one_thread()
-    with torch.inference_mode(), autocast(precision):
+    with torch.inference_mode():
         own = slice(MARGIN - RADIUS, RADIUS - MARGIN)
         judge = judge_tiles(net, torch.from_numpy(np.ascontiguousarray(channels[:, :, own, own])), precision)
         for row, column, index in _batches(chosen):

@@ -1,8 +1,8 @@
 """The costs of single 4 x 4 tiles of cells, each at a disparity of its own: what the exact volume has there.
 
 In the transformed domain (see ``transformed``) a tile of the hidden layer takes four tiles of conv3, and tiles side
-by side at one disparity share them: those of a batch are made once each. In bfloat16, and for the paper's head, each
-tile goes through the network's own convolutions with all the context that it needs.
+by side at one disparity share them: those of a batch are made once each. With the paper's head each tile goes through
+the network's own convolutions with all the context that it needs.
 """
 
 from collections.abc import Callable
@@ -16,19 +16,19 @@ from torch.nn import functional
 from stages.kernel import kernel
 from stages.matching.declaration import RADIUS
 from stages.matching.net import SIDES, MatchingNet
+from stages.matching.storage import Flat, Stored, flat, stored
 from stages.matching.transformed import (
     FEATURES,
     JOINED,
     UNITS,
     TransformedNet,
     features,
-    flat,
     is_transformable,
     join,
     units,
 )
-from stages.matching.winograd import TILE, Flat, forward8, load4, load8, store8
-from stages.precision import Precision
+from stages.matching.winograd import TILE, forward8, load4, load8, store8
+from stages.precision import Precision, autocast, dtype_of
 
 BATCH = 256
 """Tiles judged at once: few enough for all that is in between to stay in the processor's cache."""
@@ -50,12 +50,11 @@ def judge_tiles(net: MatchingNet, views: Tensor, precision: Precision) -> Judge:
         precision: arithmetic of the convolutions.
     """
     # A tile at the border reaches past what exists by less than a tile: there its cells are invalid.
-    maps = [
+    left, right = (
         functional.pad(net.embed_layers(view[None], side), (TILE, TILE, 0, TILE)).permute(0, 2, 3, 1).contiguous()
         for view, side in zip(views, SIDES, strict=True)
-    ]
-    judge = _transformed if is_transformable(net, precision) else _direct
-    return judge(net, *maps)
+    )
+    return (_transformed if is_transformable(net) else _direct)(net, left, right, precision)
 
 
 def _corners(places: Places) -> NDArray[np.int64]:
@@ -63,7 +62,7 @@ def _corners(places: Places) -> NDArray[np.int64]:
     return np.stack([places[:, 0], places[:, 1] + TILE, places[:, 1] - places[:, 2] + TILE], 1)
 
 
-def _direct(net: MatchingNet, left: Tensor, right: Tensor) -> Judge:
+def _direct(net: MatchingNet, left: Tensor, right: Tensor, precision: Precision) -> Judge:
     """Judge by the network's own convolutions."""
     # y x l JOINED reach reach: every window of the maps, without a copy
     ones, others = (each.permute(1, 2, 0, 3).unfold(0, REACH, 1).unfold(1, REACH, 1) for each in (left, right))
@@ -71,15 +70,17 @@ def _direct(net: MatchingNet, left: Tensor, right: Tensor) -> Judge:
     def judge(places: Places) -> NDArray[np.float32]:
         rows, first, second = torch.from_numpy(_corners(places)).T
         joined = functional.relu(ones[rows, first] + others[rows, second]).flatten(1, 2)
-        made: NDArray[np.float32] = net.log_odds(joined.contiguous(memory_format=torch.channels_last)).numpy()
+        with autocast(precision):
+            made: NDArray[np.float32] = net.log_odds(joined.contiguous(memory_format=torch.channels_last)).numpy()
         return made
 
     return judge
 
 
-def _transformed(net: MatchingNet, left: Tensor, right: Tensor) -> Judge:
+def _transformed(net: MatchingNet, left: Tensor, right: Tensor, precision: Precision) -> Judge:
     """Judge by transformed convolutions."""
-    transformed = TransformedNet.of(net)
+    dtype = dtype_of(precision)
+    transformed, left, right = TransformedNet.of(net, dtype), left.to(dtype), right.to(dtype)
 
     def judge(places: Places) -> NDArray[np.float32]:
         needed, slots = _quarters(places)
@@ -109,23 +110,23 @@ def _run(
 ) -> Tensor:
     """Return the units of the hidden layer, (4, 4 n, UNITS): as ``transformed.run_blocks``, for tiles anywhere."""
     count, tiles = len(corners), len(slots)
-    joined = torch.empty(count, 36, JOINED)
-    products = torch.zeros(36, count, FEATURES)
+    joined = torch.empty(count, 36, JOINED, dtype=net.conv3.dtype)
+    products = torch.zeros(36, count, FEATURES, dtype=net.conv3.dtype)
     for one, other, weight in zip(left, right, net.conv3, strict=True):
-        _join_each(one.numpy(), other.numpy(), corners, flat(joined))
+        _join_each(stored(one), stored(other), corners, stored(joined.view(-1)))
         products.baddbmm_(joined.transpose(0, 1), weight)
     maps = torch.empty(TILE, TILE * count, FEATURES)
-    features(products.numpy(), net.conv3_bias.numpy(), (1, count), flat(maps))
-    split = torch.empty(tiles, 64, FEATURES)
-    _split_each(flat(maps), count, slots, flat(split))
+    features(stored(products), net.conv3_bias.numpy(), (1, count), flat(maps))
+    split = torch.empty(tiles, 64, FEATURES, dtype=net.hidden.dtype)
+    _split_each(flat(maps), count, slots, stored(split.view(-1)))
     answers = torch.bmm(split.transpose(0, 1), net.hidden)
     made = torch.empty(TILE, TILE * tiles, UNITS)
-    units(answers.numpy(), net.hidden_bias.numpy(), (1, tiles), flat(made))
+    units(stored(answers), net.hidden_bias.numpy(), (1, tiles), flat(made))
     return made
 
 
 @kernel
-def _join_each(left: NDArray[np.float32], right: NDArray[np.float32], corners: NDArray[np.int64], tiles: Flat) -> None:
+def _join_each(left: Stored, right: Stored, corners: NDArray[np.int64], tiles: Stored) -> None:
     """Join and transform the tile at each of some corners: as ``transformed.join``."""
     size = 36 * JOINED
     for tile in range(corners.shape[0]):
@@ -134,7 +135,7 @@ def _join_each(left: NDArray[np.float32], right: NDArray[np.float32], corners: N
 
 
 @kernel
-def _split_each(given: Flat, count: int, slots: NDArray[np.int64], tiles: Flat) -> None:
+def _split_each(given: Flat, count: int, slots: NDArray[np.int64], tiles: Stored) -> None:
     """Put 8 x 8 tiles together from four of ``count`` tiles (4, 4 count, FEATURES), and transform them."""
     row = 8 * FEATURES
     part = np.empty(8 * 8 * FEATURES, np.float32)

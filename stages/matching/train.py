@@ -60,7 +60,7 @@ def train_matching_net(
 
 def crops_loss(net: MatchingNet, crops: Sequence[Crop], ranking: float, precision: Precision = "float32") -> Tensor:
     """Return the class-balanced cross-entropy of all cells of the crops, plus ``ranking`` times their ranking loss."""
-    transformed = TransformedNet.of(net) if is_transformable(net, precision) else None
+    transformed = TransformedNet.of(net) if precision == "float32" and is_transformable(net) else None
     logits = [_logits(net, transformed, crop).float() for crop in crops]
     return cells_loss(logits, [crop.labels for crop in crops], ranking)
 

@@ -1,5 +1,8 @@
 """conv3 and the compact head in the transformed domain (see ``winograd``): the same numbers by fewer products.
 
+Transforms are in float32. Embedded views and what is multiplied lie in memory as float32 or, for speed, as bfloat16;
+then so does what comes of a product.
+
 A block of cells at one disparity goes through
 
     join       add two embedded views, cut at zero, transform 6 x 6 tiles        (tile, 36, 128) a channel
@@ -19,14 +22,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from stages.kernel import inlined, kernel
 from stages.matching.net import MatchingNet
+from stages.matching.storage import Flat, Stored, flat, stored
 from stages.matching.winograd import (
     TILE,
-    Flat,
     forward6,
     forward8,
     gather6,
@@ -42,7 +44,6 @@ from stages.matching.winograd import (
     store6,
     store8,
 )
-from stages.precision import Precision
 
 JOINED = 128
 """Filters of conv2, for each of the channels."""
@@ -59,7 +60,7 @@ Corners = tuple[int, int, int]
 
 
 @kernel
-def join(left: NDArray[np.float32], right: NDArray[np.float32], corners: Corners, shape: Shape, tiles: Flat) -> None:
+def join(left: Stored, right: Stored, corners: Corners, shape: Shape, tiles: Stored) -> None:
     """Add two views of one channel (y, x, JOINED), cut at zero, and transform 6 x 6 tiles that lie 4 px apart.
 
     ``tiles``: (tile, 36, JOINED).
@@ -80,7 +81,7 @@ def join(left: NDArray[np.float32], right: NDArray[np.float32], corners: Corners
 
 
 @inlined
-def _join_row(one: Flat, other: Flat, out: Flat) -> None:
+def _join_row(one: Stored, other: Stored, out: Flat) -> None:
     """Add and cut six pixels, and transform along the row."""
     for c in range(JOINED):
         p, q = load6(one, JOINED, c), load6(other, JOINED, c)
@@ -96,7 +97,7 @@ def _join_row(one: Flat, other: Flat, out: Flat) -> None:
 
 
 @kernel
-def features(products: NDArray[np.float32], bias: Flat, shape: Shape, out: Flat) -> None:
+def features(products: Stored, bias: Flat, shape: Shape, out: Flat) -> None:
     """Transform conv3's products (36, tile, FEATURES) back, add the bias, cut at zero: (4 y, 4 x, FEATURES)."""
     row = 6 * FEATURES
     part = np.empty(TILE * 6 * FEATURES, np.float32)
@@ -112,7 +113,7 @@ def features(products: NDArray[np.float32], bias: Flat, shape: Shape, out: Flat)
 
 
 @kernel
-def split(given: Flat, shape: Shape, tiles: Flat) -> None:
+def split(given: Flat, shape: Shape, tiles: Stored) -> None:
     """Transform 8 x 8 tiles, 4 px apart, of features (4 y + 4, 4 x + 4, FEATURES): (tile, 64, FEATURES)."""
     row = 8 * FEATURES
     part = np.empty(8 * 8 * FEATURES, np.float32)
@@ -128,7 +129,7 @@ def split(given: Flat, shape: Shape, tiles: Flat) -> None:
 
 
 @kernel
-def units(products: NDArray[np.float32], bias: Flat, shape: Shape, out: Flat) -> None:
+def units(products: Stored, bias: Flat, shape: Shape, out: Flat) -> None:
     """Transform the hidden layer's products (64, tile, UNITS) back, add the bias, cut at zero: (4 y, 4 x, UNITS)."""
     row = 8 * UNITS
     part = np.empty(TILE * 8 * UNITS, np.float32)
@@ -163,9 +164,9 @@ def _biased(
     return max(v[0] + bias, ZERO), max(v[1] + bias, ZERO), max(v[2] + bias, ZERO), max(v[3] + bias, ZERO)
 
 
-def is_transformable(net: MatchingNet, precision: Precision) -> bool:
-    """Return whether this module computes what the network does: the compact head in float32."""
-    return net.head == "compact" and precision == "float32"
+def is_transformable(net: MatchingNet) -> bool:
+    """Return whether this module computes what the network does: that of the compact head."""
+    return net.head == "compact"
 
 
 @dataclass(frozen=True)
@@ -178,14 +179,19 @@ class TransformedNet:
     hidden_bias: Tensor  # UNITS
 
     @classmethod
-    def of(cls, net: MatchingNet) -> "TransformedNet":
-        """Transform a network's kernels; gradients flow back to them."""
+    def of(cls, net: MatchingNet, dtype: torch.dtype = torch.float32) -> "TransformedNet":
+        """Transform a network's kernels; gradients flow back to them.
+
+        Args:
+            net: with the compact head.
+            dtype: of what is multiplied, float32 or bfloat16.
+        """
         parameters = dict(net.named_parameters())
         parts = parameters["conv3.weight"].split(JOINED, 1)  # type: ignore[no-untyped-call]
         return cls(
-            torch.stack([spread(part) for part in parts]),
+            torch.stack([spread(part) for part in parts]).to(dtype),
             parameters["conv3.bias"],
-            spread(parameters["hidden.0.weight"]),
+            spread(parameters["hidden.0.weight"]).to(dtype),
             parameters["hidden.0.bias"],
         )
 
@@ -194,9 +200,9 @@ class TransformedNet:
 class Blocks:
     """The maps of blocks of cells that a gradient needs again."""
 
-    features: Tensor  # block 4 y + 4, 4 x + 4, FEATURES
-    split: Tensor  # block tile 64 FEATURES
-    units: Tensor  # block 4 y, 4 x, UNITS
+    features: Tensor  # block 4 y + 4, 4 x + 4, FEATURES; float32
+    split: Tensor  # block tile 64 FEATURES; of the dtype that is multiplied
+    units: Tensor  # block 4 y, 4 x, UNITS; float32
 
 
 def run_blocks(net: TransformedNet, left: Tensor, right: Tensor, corners: Sequence[Corners], shape: Shape) -> Blocks:
@@ -211,24 +217,18 @@ def run_blocks(net: TransformedNet, left: Tensor, right: Tensor, corners: Sequen
     """
     wide = shape[0] + 1, shape[1] + 1  # the hidden layer reaches 4 px on
     count = len(corners)
-    joined = torch.empty(count, wide[0] * wide[1], 36, JOINED)
-    products = torch.zeros(36, count * wide[0] * wide[1], FEATURES)
+    joined = torch.empty(count, wide[0] * wide[1], 36, JOINED, dtype=net.conv3.dtype)
+    products = torch.zeros(36, count * wide[0] * wide[1], FEATURES, dtype=net.conv3.dtype)
     for one, other, weight in zip(left, right, net.conv3, strict=True):
         for at, block in zip(corners, joined, strict=True):
-            join(one.numpy(), other.numpy(), at, wide, flat(block))
+            join(stored(one), stored(other), at, wide, stored(block.view(-1)))
         products.baddbmm_(joined.flatten(0, 1).transpose(0, 1), weight)
     maps = torch.empty(count, TILE * wide[0], TILE * wide[1], FEATURES)
-    features(products.numpy(), net.conv3_bias.numpy(), (count * wide[0], wide[1]), flat(maps))
-    tiles = torch.empty(count, shape[0] * shape[1], 64, FEATURES)
+    features(stored(products), net.conv3_bias.numpy(), (count * wide[0], wide[1]), flat(maps))
+    tiles = torch.empty(count, shape[0] * shape[1], 64, FEATURES, dtype=net.hidden.dtype)
     for block, one in zip(maps, tiles, strict=True):
-        split(flat(block), shape, flat(one))
+        split(flat(block), shape, stored(one.view(-1)))
     answers = torch.bmm(tiles.flatten(0, 1).transpose(0, 1), net.hidden)
     made = torch.empty(count, TILE * shape[0], TILE * shape[1], UNITS)
-    units(answers.numpy(), net.hidden_bias.numpy(), (count * shape[0], shape[1]), flat(made))
+    units(stored(answers), net.hidden_bias.numpy(), (count * shape[0], shape[1]), flat(made))
     return Blocks(maps, tiles, made)
-
-
-def flat(tensor: Tensor) -> Flat:
-    """Return a tensor's numbers as the kernels take them, sharing the memory."""
-    numbers: Flat = tensor.view(-1).numpy()
-    return numbers

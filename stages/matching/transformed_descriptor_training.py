@@ -12,10 +12,10 @@ from torch import Tensor
 
 from stages.kernel import inlined, kernel
 from stages.matching.descriptor_net import WIDTH
+from stages.matching.storage import Flat
 from stages.matching.transformed_descriptors import TILES, convolved, corner, six_pixels, split
 from stages.matching.winograd import (
     TILE,
-    Flat,
     Four,
     forward6_transposed,
     gather6,

@@ -8,6 +8,7 @@ rows and columns of such an image, and so are the pixels that it answers. From l
     merge      transform back, add the bias, cut at a floor                      (y, x, 64)
 
 for some tiles at a time, so that they stay in the processor's cache. The first layer has too few channels to gain.
+What is multiplied, and what comes of it, is float32 or bfloat16, as in ``transformed``.
 """
 
 import math
@@ -22,9 +23,9 @@ from torch.nn import functional
 from stages.kernel import inlined, kernel
 from stages.matching.declaration import DILATIONS, REACH
 from stages.matching.descriptor_net import WIDTH, DescriptorNet
+from stages.matching.storage import Flat, Stored, stored
 from stages.matching.winograd import (
     TILE,
-    Flat,
     Four,
     Six,
     forward6,
@@ -56,7 +57,7 @@ def corner(tile: int, step: int, width: int) -> Corner:
 
 
 @inlined
-def six_pixels(maps: NDArray[np.float32], y: int, x: int, step: int) -> Six[Flat]:
+def six_pixels(maps: NDArray[np.float32], y: int, x: int, step: int) -> Six[Stored]:
     """Return the channels of six pixels of a row, ``step`` px apart."""
     return (
         maps[y, x],
@@ -69,7 +70,7 @@ def six_pixels(maps: NDArray[np.float32], y: int, x: int, step: int) -> Six[Flat
 
 
 @kernel
-def split(maps: NDArray[np.float32], first: int, count: int, step: int, tiles: Flat) -> None:
+def split(maps: NDArray[np.float32], first: int, count: int, step: int, tiles: Stored) -> None:
     """Transform the tiles of maps (y, x, WIDTH) from tile ``first`` on: (tile, 36, WIDTH)."""
     row = 6 * WIDTH
     part = np.empty(6 * row, np.float32)  # one tile, transformed along its rows
@@ -85,9 +86,7 @@ def split(maps: NDArray[np.float32], first: int, count: int, step: int, tiles: F
 
 
 @kernel
-def merge(
-    products: NDArray[np.float32], bias: Flat, floor: np.float32, first: int, step: int, maps: NDArray[np.float32]
-) -> None:
+def merge(products: Stored, bias: Flat, floor: np.float32, first: int, step: int, maps: NDArray[np.float32]) -> None:
     """Transform products (36, tile, WIDTH) back, add the bias, cut at the floor, into maps (y, x, WIDTH)."""
     row = 6 * WIDTH
     part = np.empty(TILE * row, np.float32)
@@ -110,9 +109,9 @@ def _floored(v: Four[np.float32], bias: np.float32, floor: np.float32) -> Four[n
     return max(v[0] + bias, floor), max(v[1] + bias, floor), max(v[2] + bias, floor), max(v[3] + bias, floor)
 
 
-def kernels_of(net: DescriptorNet) -> list[Tensor]:
+def kernels_of(net: DescriptorNet, dtype: torch.dtype = torch.float32) -> list[Tensor]:
     """Return the kernels of every layer but the first in the transformed domain; gradients flow back to them."""
-    return [spread(layer.weight) for layer in [*net.hidden[1:], net.out]]
+    return [spread(layer.weight).to(dtype) for layer in [*net.hidden[1:], net.out]]
 
 
 def convolved(maps: Tensor, weight: Tensor, bias: Tensor, floor: float, step: int) -> Tensor:
@@ -120,27 +119,28 @@ def convolved(maps: Tensor, weight: Tensor, bias: Tensor, floor: float, step: in
 
     Args:
         maps: float32, contiguous; y and x multiples of 4 step.
-        weight: (36, 64, 64), the transformed kernels.
+        weight: (36, 64, 64), the transformed kernels; their dtype is that of what is multiplied.
         bias: (64,).
         floor: 0 for a ReLU, minus infinity for none.
         step: distance of the kernels' taps, px.
     """
     made = torch.empty(maps.shape[0] - 2 * step, maps.shape[1] - 2 * step, WIDTH)
     total = made.shape[0] * made.shape[1] // TILE**2
-    tiles, products = torch.empty(TILES, 36, WIDTH), torch.empty(36 * TILES * WIDTH)
+    tiles = torch.empty(TILES, 36, WIDTH, dtype=weight.dtype)
+    products = torch.empty(36 * TILES * WIDTH, dtype=weight.dtype)
     for first in range(0, total, TILES):
         count = min(TILES, total - first)
-        split(maps.numpy(), first, count, step, tiles.view(-1).numpy())
+        split(maps.numpy(), first, count, step, stored(tiles.view(-1)))
         answers = products[: 36 * count * WIDTH].view(36, count, WIDTH)
         torch.bmm(tiles[:count].transpose(0, 1), weight, out=answers)
-        merge(answers.numpy(), bias.numpy(), np.float32(floor), first, step, made.numpy())
+        merge(stored(answers), bias.numpy(), np.float32(floor), first, step, made.numpy())
     return made
 
 
 def transformed_descriptors(
     net: DescriptorNet, kernels: Sequence[Tensor], view: Tensor, layer: Layer = convolved
 ) -> Tensor:
-    """Return the descriptors of a view, as the network makes them in float32.
+    """Return the descriptors of a view, as the network makes them.
 
     Args:
         net: the network.

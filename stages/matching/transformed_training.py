@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from stages.kernel import inlined, kernel
+from stages.matching.storage import Flat, flat
 from stages.matching.transformed import (
     FEATURES,
     JOINED,
@@ -23,14 +24,12 @@ from stages.matching.transformed import (
     Shape,
     TransformedNet,
     eight_pixels,
-    flat,
     four_pixels,
     join,
     run_blocks,
 )
 from stages.matching.winograd import (
     TILE,
-    Flat,
     forward6_transposed,
     forward8_transposed,
     gather6,

@@ -12,7 +12,7 @@ and infinity, for five taps also +-1/2: of the usual choices those that round le
 
 The transforms are written out, since their small numbers make most products additions. ``load`` and ``store``
 reach for the numbers of a tile in a flat array in which a number's channels lie side by side: a loop over the
-channels then becomes vector instructions.
+channels then becomes vector instructions. ``gather`` and ``pick`` do so where a number's tiles lie side by side.
 
 Source: Lavin & Gray, Fast Algorithms for Convolutional Neural Networks, CVPR 2016, after S. Winograd, 1980.
 """
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from stages.kernel import inlined
+from stages.matching.storage import Flat, Stored, rounded, widened
 
 TILE = 4
 """Rows and columns of outputs that one transformed tile answers."""
@@ -32,10 +33,10 @@ POINTS = {3: (0.0, 1.0, -1.0, 2.0, -2.0), 5: (0.0, 1.0, -1.0, 2.0, -2.0, 0.5, -0
 """Interpolation points for each number of taps; infinity is the last of each."""
 
 T = TypeVar("T", np.float32, NDArray[np.float64], NDArray[np.float32])
-Four = tuple[T, T, T, T]
-Six = tuple[T, T, T, T, T, T]
-Eight = tuple[T, T, T, T, T, T, T, T]
-Flat = NDArray[np.float32]
+Part = TypeVar("Part")
+Four = tuple[Part, Part, Part, Part]
+Six = tuple[Part, Part, Part, Part, Part, Part]
+Eight = tuple[Part, Part, Part, Part, Part, Part, Part, Part]
 
 HALF, QUARTER, EIGHTH = np.float32(0.5), np.float32(0.25), np.float32(0.125)
 TWO, FOUR, FIVE, EIGHT = np.float32(2), np.float32(4), np.float32(5), np.float32(8)
@@ -50,9 +51,16 @@ def load4(p: Flat, n: int, c: int) -> Four[np.float32]:
 
 
 @inlined
-def load6(p: Flat, n: int, c: int) -> Six[np.float32]:
+def load6(p: Stored, n: int, c: int) -> Six[np.float32]:
     """Return channel ``c`` of six numbers of ``n`` channels."""
-    return p[c], p[n + c], p[2 * n + c], p[3 * n + c], p[4 * n + c], p[5 * n + c]
+    return (
+        widened(p[c]),
+        widened(p[n + c]),
+        widened(p[2 * n + c]),
+        widened(p[3 * n + c]),
+        widened(p[4 * n + c]),
+        widened(p[5 * n + c]),
+    )
 
 
 @inlined
@@ -62,7 +70,7 @@ def load8(p: Flat, n: int, c: int) -> Eight[np.float32]:
 
 
 @inlined
-def gather6(p: NDArray[np.float32], first: int, tile: int) -> Six[Flat]:
+def gather6(p: Stored, first: int, tile: int) -> Six[Stored]:
     """Return the channels of six numbers of a tile, a row of six apart: of (number, tile, channel)."""
     return (
         p[first, tile],
@@ -75,7 +83,7 @@ def gather6(p: NDArray[np.float32], first: int, tile: int) -> Six[Flat]:
 
 
 @inlined
-def gather8(p: NDArray[np.float32], first: int, tile: int) -> Eight[Flat]:
+def gather8(p: Stored, first: int, tile: int) -> Eight[Stored]:
     """Return the channels of eight numbers of a tile, a row of eight apart: of (number, tile, channel)."""
     return (
         p[first, tile],
@@ -90,15 +98,31 @@ def gather8(p: NDArray[np.float32], first: int, tile: int) -> Eight[Flat]:
 
 
 @inlined
-def pick6(p: Six[Flat], c: int) -> Six[np.float32]:
+def pick6(p: Six[Stored], c: int) -> Six[np.float32]:
     """Return channel ``c`` of six numbers."""
-    return p[0][c], p[1][c], p[2][c], p[3][c], p[4][c], p[5][c]
+    return (
+        widened(p[0][c]),
+        widened(p[1][c]),
+        widened(p[2][c]),
+        widened(p[3][c]),
+        widened(p[4][c]),
+        widened(p[5][c]),
+    )
 
 
 @inlined
-def pick8(p: Eight[Flat], c: int) -> Eight[np.float32]:
+def pick8(p: Eight[Stored], c: int) -> Eight[np.float32]:
     """Return channel ``c`` of eight numbers."""
-    return p[0][c], p[1][c], p[2][c], p[3][c], p[4][c], p[5][c], p[6][c], p[7][c]
+    return (
+        widened(p[0][c]),
+        widened(p[1][c]),
+        widened(p[2][c]),
+        widened(p[3][c]),
+        widened(p[4][c]),
+        widened(p[5][c]),
+        widened(p[6][c]),
+        widened(p[7][c]),
+    )
 
 
 @inlined
@@ -108,16 +132,18 @@ def store4(p: Flat, n: int, c: int, v: Four[np.float32]) -> None:
 
 
 @inlined
-def store6(p: Flat, n: int, c: int, v: Six[np.float32]) -> None:
+def store6(p: Stored, n: int, c: int, v: Six[np.float32]) -> None:
     """Write channel ``c`` of six numbers of ``n`` channels."""
-    p[c], p[n + c], p[2 * n + c], p[3 * n + c], p[4 * n + c], p[5 * n + c] = v
+    p[c], p[n + c], p[2 * n + c] = rounded(v[0], p), rounded(v[1], p), rounded(v[2], p)
+    p[3 * n + c], p[4 * n + c], p[5 * n + c] = rounded(v[3], p), rounded(v[4], p), rounded(v[5], p)
 
 
 @inlined
-def store8(p: Flat, n: int, c: int, v: Eight[np.float32]) -> None:
+def store8(p: Stored, n: int, c: int, v: Eight[np.float32]) -> None:
     """Write channel ``c`` of eight numbers of ``n`` channels."""
-    p[c], p[n + c], p[2 * n + c], p[3 * n + c] = v[0], v[1], v[2], v[3]
-    p[4 * n + c], p[5 * n + c], p[6 * n + c], p[7 * n + c] = v[4], v[5], v[6], v[7]
+    p[c], p[n + c], p[2 * n + c] = rounded(v[0], p), rounded(v[1], p), rounded(v[2], p)
+    p[3 * n + c], p[4 * n + c], p[5 * n + c] = rounded(v[3], p), rounded(v[4], p), rounded(v[5], p)
+    p[6 * n + c], p[7 * n + c] = rounded(v[6], p), rounded(v[7], p)
 
 
 @inlined

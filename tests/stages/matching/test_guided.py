@@ -42,13 +42,16 @@ def vectors() -> dict[str, dict[str, np.ndarray]]:
         pytest.param(2, "compact", "float32", range(-12, 13), EXACT, id="negative disparities: both borders"),
         pytest.param(1, "compact", "float32", range(-40, 41), EXACT, id="a range wider than the image"),
         pytest.param(2, "paper", "float32", range(-2, 3), EXACT, id="the paper's head, directly"),
-        pytest.param(3, "compact", "bfloat16", range(0, 6), 0.2, id="bfloat16, directly"),
+        pytest.param(3, "compact", "bfloat16", range(0, 6), 0.9, id="bfloat16"),
     ],
 )
 def test_what_is_judged_is_the_exact_volume(
     channels: int, head: Head, precision: Precision, disparities: range, bound: float
 ) -> None:
-    """On noise, where every tile proposes other disparities; its size is no multiple of a tile."""
+    """On noise, where every tile proposes other disparities; its size is no multiple of a tile.
+
+    In bfloat16 the rounding depends on where the tiles of a volume lie: a tenth of the costs' spread at most.
+    """
     net, given = random_net(channels, head), views(channels)
     exact = cost_volume(net, given, disparities, precision)
     made = guided_cost_volume(net, random_descriptor_net(given.shape[1]), given, disparities, VOTES, precision)

@@ -41,7 +41,19 @@ def test_equals_the_direct_convolutions(
     assert (made - torch.stack(expected)).abs().max() <= 1e-4
 
 
-def test_only_the_compact_head_in_float32_is_transformed() -> None:
-    assert is_transformable(random_net(1), "float32")
-    assert not is_transformable(random_net(1), "bfloat16")
-    assert not is_transformable(random_net(1, "paper"), "float32")
+def test_only_the_compact_head_is_transformed() -> None:
+    assert is_transformable(random_net(1))
+    assert not is_transformable(random_net(1, "paper"))
+
+
+def test_in_bfloat16_what_is_multiplied_is_rounded_and_nothing_else() -> None:
+    views = torch.from_numpy(np.random.default_rng(1).normal(size=(2, 1, 14, 14, 128)).astype(np.float32))
+    with torch.inference_mode():
+        exact, rounded = (
+            run_blocks(TransformedNet.of(random_net(1), dtype), *views, [(0, 0, 0)], (2, 2))
+            for dtype in (torch.float32, torch.bfloat16)
+        )
+    assert rounded.split.dtype == torch.bfloat16
+    for one, other in ((exact.features, rounded.features), (exact.units, rounded.units)):
+        assert other.dtype == torch.float32 and not torch.equal(other, other.bfloat16().float())
+        assert 0 < (one - other).abs().mean() <= 0.05 * one.std()

@@ -5,8 +5,23 @@ import pytest
 import torch
 from torch.nn import functional
 
+from stages.kernel import kernel
 from stages.matching import winograd
-from stages.matching.winograd import POINTS, TILE, forward6, forward8, inverse6, inverse8, spread
+from stages.matching.winograd import (
+    POINTS,
+    TILE,
+    forward6,
+    forward8,
+    inverse6,
+    inverse8,
+    load4,
+    load6,
+    load8,
+    spread,
+    store4,
+    store6,
+    store8,
+)
 
 TRANSFORMS = {3: (forward6, inverse6), 5: (forward8, inverse8)}
 
@@ -47,14 +62,28 @@ def test_gradients_go_back_by_the_transpose(name: str) -> None:
     assert np.array_equal(back, there.T)
 
 
-@pytest.mark.parametrize("count", [4, 6, 8])
-def test_numbers_are_loaded_and_stored_by_channel(count: int) -> None:
-    given = np.arange(count * 5, dtype=np.float32)
-    loaded = getattr(winograd, f"load{count}")(given, 5, 3)
-    assert loaded == tuple(range(3, count * 5, 5))
-    stored = np.zeros_like(given)
-    getattr(winograd, f"store{count}")(stored, 5, 3, loaded)
-    assert np.array_equal(np.flatnonzero(stored), np.arange(3, count * 5, 5))
+@kernel
+def _copied4(given: np.ndarray, out: np.ndarray) -> None:
+    store4(out, 5, 3, load4(given, 5, 3))
+
+
+@kernel
+def _copied6(given: np.ndarray, out: np.ndarray) -> None:
+    store6(out, 5, 3, load6(given, 5, 3))
+
+
+@kernel
+def _copied8(given: np.ndarray, out: np.ndarray) -> None:
+    store8(out, 5, 3, load8(given, 5, 3))
+
+
+@pytest.mark.parametrize(("count", "copied"), [(4, _copied4), (6, _copied6), (8, _copied8)])
+def test_numbers_are_loaded_and_stored_by_channel(count: int, copied: Callable) -> None:
+    given, out = np.arange(1, count * 5 + 1, dtype=np.float32), np.zeros(count * 5, np.float32)
+    copied(given, out)
+    expected = np.zeros_like(given)
+    expected[3::5] = given[3::5]
+    assert np.array_equal(out, expected)
 
 
 def test_gradients_flow_through_spread() -> None:
