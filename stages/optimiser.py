@@ -64,10 +64,21 @@ def orthogonal(matrix: Tensor) -> Tensor:
     if matrix.shape[0] > matrix.shape[1]:
         return orthogonal(matrix.T).T
     scaled = matrix / matrix.norm().clamp(min=torch.finfo(matrix.dtype).tiny)
-    squares, directions = torch.linalg.eigh(scaled @ scaled.T)
+    squares, directions = _eigh(scaled @ scaled.T)
     floor = max(FLOOR * float(squares[-1]), torch.finfo(matrix.dtype).tiny)
     part: Tensor = (directions * squares.clamp(min=floor).rsqrt()) @ (directions.T @ scaled)
     return part
+
+
+def _eigh(matrix: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the eigenvalues and eigenvectors of a symmetric float32 matrix.
+
+    LAPACK's float32 can answer NaN for one of low rank, such as that of a layer with dead units; float64 then does not.
+    """
+    values, vectors = torch.linalg.eigh(matrix)
+    if not (values.isfinite().all() and vectors.isfinite().all()):
+        values, vectors = (each.to(matrix.dtype) for each in torch.linalg.eigh(matrix.double()))
+    return values, vectors
 
 
 def optimisers_of(net: nn.Module, schedule: Schedule) -> list[torch.optim.Optimizer]:
