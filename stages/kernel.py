@@ -25,8 +25,10 @@ def kernel(function: Function) -> Function:
     # Numba names the file on disk by this, and compiles anew when the function's own module has changed. The digest
     # makes it so for the modules that its helpers and constants come from.
     function.__qualname__ = f"{name}-{_digest(function.__module__)}"
-    compiled = numba.njit(cache=True, nogil=True)(function)
-    function.__qualname__ = name
+    try:
+        compiled = numba.njit(cache=True, nogil=True)(function)
+    finally:
+        function.__qualname__ = name
     return cast(Function, compiled)
 
 
