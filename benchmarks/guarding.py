@@ -131,9 +131,7 @@ def _again(dataset: str, upto: str, made: Result) -> dict[str, float]:
 
 
 def guarding(
-    dataset: Annotated[
-        str, typer.Argument(help="such as motorcycle")
-    ] = "synthetic:train=0,test=1,height=240,width=320",
+    dataset: Annotated[str, typer.Argument(help="such as synthetic")] = "motorcycle",
     upto: Annotated[str, typer.Option(help="the product to stop at")] = "metrics",
     out: Annotated[Path | None, typer.Option("--json", help="write the figures here")] = None,
 ) -> None:

@@ -18,8 +18,8 @@ MADE = ("images", "truth", *(stage.product for stage in CATALOG if stage.scope =
 
 def main(
     rows: Annotated[int, typer.Option()] = 512,
-    columns: Annotated[int, typer.Option()] = 192,
-    disparities: Annotated[int, typer.Option()] = 20,
+    columns: Annotated[int, typer.Option()] = 320,
+    disparities: Annotated[int, typer.Option()] = 32,
     pairs: Annotated[int, typer.Option()] = PAIRS,
 ) -> None:
     """Compare whole runs, networks excepted."""

@@ -119,16 +119,17 @@ def _transformed(net: MatchingNet, views: Tensor, precision: Precision) -> Costs
     dtype = dtype_of(precision)
     transformed = TransformedNet.of(net, dtype)
     left, right = (
-        # The filters of a pixel lie side by side; the last tile may reach over the edge.
-        functional.pad(net.embed_layers(view[None], side).permute(0, 2, 3, 1).to(dtype), (0, 0, 0, TILE, 0, TILE))
+        # The filters of a pixel lie side by side; tiles at the borders may reach over the edge.
+        functional.pad(net.embed_layers(view[None], side).permute(0, 2, 3, 1).to(dtype), (0, 0, TILE, TILE, 0, TILE))
         for view, side in zip(views, SIDES, strict=True)
     )
 
     def costs(y: int, x: int, columns: int, disparity: int) -> NDArray[np.float32]:
-        rows = min(ROWS, height - y)
-        shape = -(-rows // TILE), -(-columns // TILE)
-        units = run_blocks(transformed, left, right, [(y, x, x - disparity)], shape).units[0]
-        made: NDArray[np.float32] = net.odds_of_features(units)[:rows, :columns].numpy()
+        rows, before = min(ROWS, height - y), x % TILE  # tiles begin at the same columns whatever the disparity
+        shape = -(-rows // TILE), -(-(before + columns) // TILE)
+        corner = y, x - before + TILE, x - before - disparity + TILE
+        units = run_blocks(transformed, left, right, [corner], shape).units[0]
+        made: NDArray[np.float32] = net.odds_of_features(units)[:rows, before : before + columns].numpy()
         return made
 
     return costs

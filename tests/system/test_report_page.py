@@ -43,11 +43,14 @@ def brightness(colour: str) -> float:
     return float(np.mean([int(part) for part in colour.removeprefix("rgb(").rstrip(")").split(",")]))
 
 
+PLACES = "[...document.querySelectorAll('.frame')].map((frame) => [frame.scrollLeft, frame.scrollTop])"
+
+
 def wait_until(seen: Seen, condition: str, seconds: float = 10) -> None:
     """Ask again and again from outside: the page's policy forbids the page to evaluate text, as waiting inside does."""
     end = time.monotonic() + seconds
     while not seen.page.evaluate(condition):
-        assert time.monotonic() < end, condition
+        assert time.monotonic() < end, f"{condition}; the pictures are at {seen.page.evaluate(PLACES)}"
         seen.page.wait_for_timeout(20)
 
 

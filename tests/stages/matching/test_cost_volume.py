@@ -5,6 +5,7 @@ from stages.matching import cost_volume as module
 from stages.matching.cost_volume import cost_volume, padded_cost_volume, valid_columns
 from stages.matching.declaration import COST_VOLUME, CostVolumeParams, Head
 from stages.parameters import to_vector
+from stages.precision import Precision
 from stages.stage import StageError
 from tests.stages.matching.reference import literal_volume, random_net, shifted_scene
 from tests.stages.tiling import tiled, whole
@@ -103,13 +104,13 @@ def test_a_constant_image_costs_the_same_everywhere() -> None:
 
 
 def test_bfloat16_is_close_to_float32() -> None:
-    """bfloat16 keeps 8 bits: within 5 % of the costs' spread anywhere, within 1 % on average."""
+    """bfloat16 keeps 8 bits: within 8 % of the costs' spread anywhere, within 1 % on average."""
     net, given = random_net(), views(height=16, width=24)
     exact = cost_volume(net, given, range(-2, 6))
     rough = cost_volume(net, given, range(-2, 6), "bfloat16")
     spread = np.nanmax(exact) - np.nanmin(exact)
     assert rough.dtype == np.float32
-    assert 0 < difference(rough, exact) <= 0.05 * spread
+    assert 0 < difference(rough, exact) <= 0.08 * spread
     assert np.nanmean(np.abs(rough - exact)) <= 0.01 * spread
 
 
@@ -119,12 +120,17 @@ def test_views_may_bring_their_own_context() -> None:
     assert difference(padded_cost_volume(net, rows, range(3)), cost_volume(net, given, range(3))[4:8]) <= EXACT
 
 
-@pytest.mark.parametrize("rows", [1, 7, 20])
-def test_tiles_equal_the_whole(rows: int) -> None:
-    """As far as float16 tells: the order of the sums in a convolution may depend on the size of its input."""
+@pytest.mark.parametrize(
+    ("rows", "precision"), [(1, "float32"), (7, "float32"), (20, "float32"), (4, "bfloat16"), (20, "bfloat16")]
+)
+def test_tiles_equal_the_whole(rows: int, precision: Precision) -> None:
+    """As far as float16 tells: the order of the sums in a convolution may depend on the size of its input.
+
+    In bfloat16 for tiles of a multiple of four rows, as the stage's own are: others begin their transforms elsewhere.
+    """
     scene = shifted_scene(height=23, width=21)
     given = {"channels": scene["channels"], "matching_net": {"parameters": to_vector(random_net())}}
-    params = CostVolumeParams(d_min=-2, d_max=5, precision="float32")
+    params = CostVolumeParams(d_min=-2, d_max=5, precision=precision)
     one, other = tiled(COST_VOLUME, params, given, DIMS, rows), whole(COST_VOLUME, params, given, DIMS)
     assert np.array_equal(one["d"], other["d"])
     largest = float(np.nanmax(np.abs(other["cost"])))
