@@ -103,15 +103,17 @@ def test_a_constant_image_costs_the_same_everywhere() -> None:
     assert np.nanmax(made) - np.nanmin(made) <= EXACT
 
 
-def test_bfloat16_is_close_to_float32() -> None:
-    """bfloat16 keeps 8 bits: within 8 % of the costs' spread anywhere, within 1 % on average."""
-    net, given = random_net(), views(height=16, width=24)
+@pytest.mark.parametrize("seed", range(4))
+def test_bfloat16_is_close_to_float32(seed: int) -> None:
+    """bfloat16 keeps 8 bits: within 1 % of the costs' spread on average, 4 % for 99 cells of 100, 8 % for the last."""
+    net, given = random_net(), views(height=16, width=24, seed=seed)
     exact = cost_volume(net, given, range(-2, 6))
     rough = cost_volume(net, given, range(-2, 6), "bfloat16")
-    spread = np.nanmax(exact) - np.nanmin(exact)
-    assert rough.dtype == np.float32
-    assert 0 < difference(rough, exact) <= 0.08 * spread
-    assert np.nanmean(np.abs(rough - exact)) <= 0.01 * spread
+    off = np.abs(rough - exact)[~np.isnan(exact)] / (np.nanmax(exact) - np.nanmin(exact))
+    assert rough.dtype == np.float32 and np.array_equal(np.isnan(rough), np.isnan(exact))
+    assert 0 < off.mean() <= 0.01
+    assert np.quantile(off, 0.99) <= 0.04
+    assert off.max() <= 0.08
 
 
 def test_views_may_bring_their_own_context() -> None:
