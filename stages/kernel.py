@@ -39,14 +39,15 @@ def inlined(function: Function) -> Function:
 
 
 def _digest(module: str) -> str:
-    """Return a digest of the sources of a module and of all that it imports from its top-level package."""
+    """Return a digest of the sources of a module and of all that it imports from its top-level package or this one."""
+    packages = {module.split(".")[0], __name__.split(".")[0]}
     found: set[str] = set()
     waiting = [module]
     while waiting:
         name = waiting.pop()
         if name not in found and name in sys.modules:
             found.add(name)
-            waiting += (each for each in _source(name)[1] if each.split(".")[0] == module.split(".")[0])
+            waiting += (each for each in _source(name)[1] if each.split(".")[0] in packages)
     return hashlib.sha256(b"".join(_source(name)[0] for name in sorted(found))).hexdigest()[:16]
 
 
