@@ -17,6 +17,8 @@ test: $(READY)  ## run the tests
 	$(BIN)/python -m pytest tests
 
 lint: $(READY)  ## style, types, and who may import whom
+	mkdir -p build/names/semidense  # mypy does not follow the import hook of an editable install
+	for folder in pipeline stages datasets cache; do ln -sfn ../../../$$folder build/names/semidense/$$folder; done
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
@@ -58,7 +60,7 @@ wheel: $(READY)
 clean:
 	rm -rf .venv build dist demo *.egg-info
 
-$(READY): pyproject.toml constraints.txt
+$(READY): pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	@touch $@

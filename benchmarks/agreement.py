@@ -16,10 +16,10 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.harness import write
-from pipeline.api import Result, Task, run
-from stages.evaluation.agreement import agreement
-from stages.evaluation.declaration import ConfidenceParams
-from stages.metrics import auc, optimal_auc
+from semidense.pipeline.api import Result, Task, run
+from semidense.stages.evaluation.agreement import agreement
+from semidense.stages.evaluation.declaration import ConfidenceParams
+from semidense.stages.metrics import auc, optimal_auc
 
 WINDOWS = (9, 13, 17, 21, 25, 29, 33)
 WEIGHTS = (0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)

@@ -21,21 +21,21 @@ from rich.table import Table
 from benchmarks.guided import Side, shipped_nets
 from benchmarks.harness import FOLDER, PAIRS, Ratio, compare, median_seconds, report, timed, write
 from benchmarks.peers import AccurateMatcher, PeerError
-from datasets import Scene, open_dataset
-from pipeline.shipped import read_shipped_weights
-from stages.baselines.declaration import SgmParams
-from stages.baselines.sgm import match_semi_global
-from stages.disparity import winner_take_all
-from stages.matching.cost_volume import cost_volume
-from stages.matching.declaration import CostVolumeParams
-from stages.matching.descriptor_net import descriptor_net_from_parameters
-from stages.matching.fast import fast_cost_volume
-from stages.matching.net import net_from_parameters
-from stages.metrics import raw_bad
-from stages.precision import resolve
-from stages.threads import one_thread
-from stages.transforms.channels import channels
-from stages.transforms.gray import to_gray
+from semidense.datasets import Scene, open_dataset
+from semidense.pipeline.plan.shipped_weights import read_shipped_weights
+from semidense.stages.baselines.declaration import SgmParams
+from semidense.stages.baselines.sgm import match_semi_global
+from semidense.stages.compute.precision import resolve
+from semidense.stages.compute.threads import one_thread
+from semidense.stages.disparity.winner_takes_all import winner_take_all
+from semidense.stages.matching.cost_volume import cost_volume
+from semidense.stages.matching.declaration import CostVolumeParams
+from semidense.stages.matching.descriptors.net import descriptor_net_from_parameters
+from semidense.stages.matching.descriptors.volume import fast_cost_volume
+from semidense.stages.matching.net import net_from_parameters
+from semidense.stages.metrics import raw_bad
+from semidense.stages.transforms.channels import channels
+from semidense.stages.transforms.gray import to_gray
 
 FASTEST = "MC-CNN fast, onnx dw"
 """The quickest form of MC-CNN fast."""

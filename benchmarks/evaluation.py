@@ -8,11 +8,11 @@ import numpy as np
 import torch
 
 from benchmarks.harness import compare, report
-from stages.evaluation.confidence import confidence
-from stages.evaluation.declaration import PATCH
-from stages.evaluation.net import EvaluationNet
-from stages.parameters import initialise
-from stages.threads import one_thread
+from semidense.stages.compute.threads import one_thread
+from semidense.stages.evaluation.confidence import confidence
+from semidense.stages.evaluation.declaration import PATCH
+from semidense.stages.evaluation.net import EvaluationNet
+from semidense.stages.learning.parameters import initialise
 
 SIZE = (128, 192)
 PATCHES = 64

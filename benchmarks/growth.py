@@ -11,8 +11,8 @@ from typing import Annotated
 import typer
 
 from benchmarks.harness import PAIRS, Ratio, report, timed
-from pipeline.api import Task, run
-from stages.matching.cost_volume import valid_columns
+from semidense.pipeline.api import Task, run
+from semidense.stages.matching.cost_volume import valid_columns
 
 SIZES = ((64, 192, 16), (128, 192, 16), (128, 384, 16), (128, 384, 32))
 """Rows, columns, largest disparity: twice the cells each time."""

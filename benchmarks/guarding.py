@@ -22,22 +22,22 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cache import check
-from pipeline.api import Result, Task, run
+from semidense.cache.entries import check
+from semidense.pipeline.api import Result, Task, run
 
 TARGET = 3.0
 """Percent of the stage's time."""
 LONG = 1.0
 """Seconds from which on a stage is held to the target; shorter ones count in the whole."""
 GUARDS = (
-    "cache.store.inspect",
-    "cache.publish.inspect",
-    "cache.publish.remove_strays",
-    "cache.publish.seal",
-    "cache.publish.commit",
-    "cache.draft.Draft._complete",
-    "cache.store.Store.claim",
-    "cache.lease.Lease.add",
+    "semidense.cache.store.inspect",
+    "semidense.cache.entries.publish.inspect",
+    "semidense.cache.entries.publish.remove_strays",
+    "semidense.cache.entries.publish.seal",
+    "semidense.cache.entries.publish.commit",
+    "semidense.cache.entries.draft.Draft._complete",
+    "semidense.cache.store.Store.claim",
+    "semidense.cache.processes.lease.Lease.add",
 )
 TASKS = ("begin", "create_arrays", "make_tile", "make_whole", "publish")
 
@@ -51,7 +51,7 @@ class Clock:
         self._here = threading.local()
 
     def timed_task(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Wrap a task of `pipeline.tasks`: whatever it does counts for its step's product."""
+        """Wrap a task of `semidense.pipeline.execution.tasks`: whatever it does counts for its step's product."""
 
         def task(*arguments: Any, **options: Any) -> Any:  # noqa: ANN401
             step = next(each for each in arguments if hasattr(each, "stage") or hasattr(each, "step"))
@@ -90,7 +90,7 @@ def clocked() -> Iterator[Clock]:
     """Time all tasks and guards of this process."""
     from contextlib import ExitStack
 
-    from pipeline import tasks
+    from semidense.pipeline.execution import tasks
 
     clock = Clock()
     with ExitStack() as stack:

@@ -18,14 +18,14 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.harness import PAIRS, Ratio, report, timed
-from datasets import SceneSource, open_dataset
-from pipeline.shipped import read_shipped_weights
-from stages.disparity import winner_take_all
-from stages.matching.declaration import COST_VOLUME, CostVolumeParams, Mode
-from stages.metrics import raw_bad
-from stages.precision import resolve
-from stages.threads import one_thread
-from stages.transforms.channels import channels
+from semidense.datasets import SceneSource, open_dataset
+from semidense.pipeline.plan.shipped_weights import read_shipped_weights
+from semidense.stages.compute.precision import resolve
+from semidense.stages.compute.threads import one_thread
+from semidense.stages.disparity.winner_takes_all import winner_take_all
+from semidense.stages.matching.declaration import COST_VOLUME, CostVolumeParams, Mode
+from semidense.stages.metrics import raw_bad
+from semidense.stages.transforms.channels import channels
 
 MODES: tuple[Mode, Mode] = ("guided", "exact")
 DEFAULTS = CostVolumeParams()

@@ -16,11 +16,11 @@ from rich.table import Table
 
 from benchmarks.harness import write
 from benchmarks.precision import block_costs, middle_rows
-from datasets import SceneSource, open_dataset
-from pipeline.shipped import read_shipped_weights
-from stages.disparity import winner_take_all
-from stages.matching.net import MatchingNet, net_from_parameters
-from stages.metrics import raw_bad
+from semidense.datasets import SceneSource, open_dataset
+from semidense.pipeline.plan.shipped_weights import read_shipped_weights
+from semidense.stages.disparity.winner_takes_all import winner_take_all
+from semidense.stages.matching.net import MatchingNet, net_from_parameters
+from semidense.stages.metrics import raw_bad
 
 FULL = 128
 RANKS = (16, 32, 64, 96)

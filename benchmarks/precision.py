@@ -16,15 +16,15 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.harness import timed
-from datasets import SceneSource, open_dataset
-from pipeline.shipped import read_shipped_weights
-from stages.disparity import winner_take_all
-from stages.matching.cost_volume import padded_cost_volume
-from stages.matching.declaration import RADIUS
-from stages.matching.net import MatchingNet, net_from_parameters
-from stages.metrics import raw_bad
-from stages.precision import Precision, fast_bfloat16
-from stages.transforms.channels import channels
+from semidense.datasets import SceneSource, open_dataset
+from semidense.pipeline.plan.shipped_weights import read_shipped_weights
+from semidense.stages.compute.precision import Precision, fast_bfloat16
+from semidense.stages.disparity.winner_takes_all import winner_take_all
+from semidense.stages.matching.cost_volume import padded_cost_volume
+from semidense.stages.matching.declaration import RADIUS
+from semidense.stages.matching.net import MatchingNet, net_from_parameters
+from semidense.stages.metrics import raw_bad
+from semidense.stages.transforms.channels import channels
 
 
 def measure(scene: SceneSource, net: MatchingNet, rows: int) -> dict[str, Any]:

@@ -18,18 +18,18 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.harness import write
-from datasets import SceneSource, open_dataset
-from pipeline.api import Result, Task, carry_out
-from pipeline.config import Config
-from pipeline.errors import UsageError
-from pipeline.progress import ProgressWatch
-from pipeline.steps import Request
-from pipeline.training_split import families, training_scenes
-from stages.disparity import winner_take_all
-from stages.matching.cost_volume import compute_costs
-from stages.matching.declaration import CostVolumeParams
-from stages.metrics import raw_bad
-from stages.precision import resolve
+from semidense.datasets import SceneSource, open_dataset
+from semidense.pipeline.api import Result, Task, carry_out
+from semidense.pipeline.execution.progress import ProgressWatch
+from semidense.pipeline.plan.config import Config
+from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.steps import Request
+from semidense.pipeline.plan.training_split import families, training_scenes
+from semidense.stages.compute.precision import resolve
+from semidense.stages.disparity.winner_takes_all import winner_take_all
+from semidense.stages.matching.cost_volume import compute_costs
+from semidense.stages.matching.declaration import CostVolumeParams
+from semidense.stages.metrics import raw_bad
 
 HELD = ("Laundry", "Bowling2", "Lampshade1", "Midd1", "Plastic", "Wood2")
 """Scenes of Middlebury 2005 and 2006, easy and hard."""

@@ -2,8 +2,8 @@
 
 The limits: the rate of bare convolutions of the network's two large shapes, also with 8-bit integers, and the rate of
 bare batched matrix products of the shapes that the transformed convolutions multiply (see
-``stages.matching.transformed``). The stage counts whole: reading the channels from the cache, everything between,
-writing and publishing, in the precision that it has on this CPU. All run on one thread.
+``semidense.stages.matching.winograd.volume``). The stage counts whole: reading the channels from the cache, everything
+between, writing and publishing, in the precision that it has on this CPU. All run on one thread.
 """
 
 import tempfile
@@ -15,10 +15,10 @@ import torch
 from torch.nn import functional
 
 from benchmarks.harness import PAIRS, Ratio, report, timed
-from pipeline.api import Task, run
-from stages.matching.cost_volume import valid_columns
-from stages.precision import dtype_of, fast_bfloat16
-from stages.threads import one_thread
+from semidense.pipeline.api import Task, run
+from semidense.stages.compute.precision import dtype_of, fast_bfloat16
+from semidense.stages.compute.threads import one_thread
+from semidense.stages.matching.cost_volume import valid_columns
 
 HEIGHT, WIDTH, DISPARITIES = 128, 256, 40
 SCENE = f"synthetic:train=0,test=1,height={HEIGHT},width={WIDTH},disparities={DISPARITIES}"

@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.harness import PAIRS, Ratio, report, timed
-from pipeline.api import Task, run, sweep
+from semidense.pipeline.api import Task, run, sweep
 
 SCENE = "synthetic:train=0,test=1,height=96,width=128,disparities=16"
 VALUES = 19

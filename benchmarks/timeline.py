@@ -16,8 +16,8 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.harness import timed, write
-from pipeline.api import Task, run
-from pipeline.steps import PRODUCTS
+from semidense.pipeline.api import Task, run
+from semidense.pipeline.plan.steps import PRODUCTS
 
 PICTURE = Path("docs/pictures/timeline.png")
 SCENE = "synthetic:train=0,test=1,height=240,width=320,disparities=24"

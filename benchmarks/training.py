@@ -12,16 +12,16 @@ import torch
 import typer
 
 from benchmarks.harness import PAIRS, compare, report
-from datasets import open_dataset
-from stages.matching.crops import IGNORED, cut_crop
-from stages.matching.declaration import Form, MatchingNetParams, MatchingSamplesParams
-from stages.matching.net import MatchingNet
-from stages.matching.samples import draw_samples
-from stages.matching.train import crops_loss
-from stages.optimiser import optimisers_of
-from stages.parameters import initialise
-from stages.threads import one_thread
-from stages.transforms.channels import channels
+from semidense.datasets import open_dataset
+from semidense.stages.compute.threads import one_thread
+from semidense.stages.learning.optimiser import optimisers_of
+from semidense.stages.learning.parameters import initialise
+from semidense.stages.matching.crops import IGNORED, cut_crop
+from semidense.stages.matching.declaration import Form, MatchingNetParams, MatchingSamplesParams
+from semidense.stages.matching.net import MatchingNet
+from semidense.stages.matching.samples import draw_samples
+from semidense.stages.matching.train import crops_loss
+from semidense.stages.transforms.channels import channels
 
 SCENE = "synthetic:train=0,test=1,height=128,width=192,disparities=40"
 

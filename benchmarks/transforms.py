@@ -5,10 +5,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.harness import compare, report
-from datasets import open_dataset
-from stages.transforms.companion import companion
-from stages.transforms.gray import to_gray
-from stages.transforms.rank import rank
+from semidense.datasets import open_dataset
+from semidense.stages.transforms.companion import companion
+from semidense.stages.transforms.gray import to_gray
+from semidense.stages.transforms.rank import rank
 
 
 @numba.njit(nogil=True)

@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from benchmarks.harness import PAIRS, compare, report
-from pipeline.api import Task, run, status
-from stages.catalog import CATALOG
+from semidense.pipeline.api import Task, run, status
+from semidense.stages.catalog import CATALOG
 
 MADE = ("images", "truth", *(stage.product for stage in CATALOG if stage.scope == "scene"))
 

@@ -12,10 +12,9 @@
 array([0, 1, 4])
 """
 
-from cache.code import code_hash, code_hash_of, code_parts
-from cache.draft import Draft
-from cache.entry import Entry
-from cache.errors import (
+from semidense.cache.entries.draft import Draft
+from semidense.cache.entries.entry import Entry
+from semidense.cache.errors import (
     CacheError,
     CacheUnavailable,
     DamagedArchive,
@@ -28,10 +27,11 @@ from cache.errors import (
     NonDeterministicStage,
     SourceNotFound,
 )
-from cache.key import ABSENT, Change, Recipe, differences
-from cache.lease import Lease
-from cache.locks import Lock
-from cache.store import Store
+from semidense.cache.keys.code import code_hash, code_hash_of, code_parts
+from semidense.cache.keys.recipe import ABSENT, Change, Recipe, differences
+from semidense.cache.processes.lease import Lease
+from semidense.cache.processes.locks import Lock
+from semidense.cache.store import Store
 
 __all__ = [
     "ABSENT",

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any, NoReturn, TypeAlias
 
-from cache.errors import InvalidRecipe
+from semidense.cache.errors import InvalidRecipe
 
 FORMAT_VERSION = 1
 """The version of keys, records and manifests; it enters every key."""

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TypeVar
 
-from cache.errors import CacheError, CacheUnavailable
+from semidense.cache.errors import CacheError, CacheUnavailable
 
 T = TypeVar("T")
 R = TypeVar("R")

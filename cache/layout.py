@@ -19,9 +19,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from cache.errors import InvalidKey
-from cache.files import make_folder, writing
-from cache.owner import owner
+from semidense.cache.errors import InvalidKey
+from semidense.cache.files import make_folder, writing
+from semidense.cache.owner import owner
 
 _KEY = re.compile(r"[0-9a-f]{64}", re.ASCII)
 _TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# This folder is a cache: all in it can be made again.\n"

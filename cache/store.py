@@ -7,24 +7,27 @@ from pathlib import Path
 from time import time
 from typing import TYPE_CHECKING, Any
 
-from cache import publish
-from cache.check import Finding, Policy, inspect, read_record
-from cache.document import plain_mapping
-from cache.draft import Draft
-from cache.entry import Entry
-from cache.errors import CacheUnavailable, DamagedEntry, EntryNotFound
-from cache.files import make_folder, reading, remove, writing
-from cache.key import Recipe, require_texts
-from cache.layout import Layout
-from cache.lease import Lease, leased, sweep_checkpoints, sweep_locks
-from cache.locks import Lock, holder, try_lock
-from cache.owner import is_abandoned
-from cache.quarantine import set_aside_if_damaged
-from cache.sources import keep_sources, kept_source
+import numpy as np
+
+from semidense.cache.document import plain_mapping
+from semidense.cache.entries import publish
+from semidense.cache.entries.check import Finding, Policy, inspect, read_record
+from semidense.cache.entries.draft import Draft
+from semidense.cache.entries.entry import Entry
+from semidense.cache.entries.quarantine import set_aside_if_damaged
+from semidense.cache.errors import CacheUnavailable, DamagedEntry, EntryNotFound
+from semidense.cache.files import make_folder, reading, remove, writing
+from semidense.cache.keys.recipe import Recipe, require_texts
+from semidense.cache.keys.sources import keep_sources, kept_source
+from semidense.cache.layout import Layout
+from semidense.cache.owner import is_abandoned
+from semidense.cache.processes.lease import Lease, leased, sweep_checkpoints, sweep_locks
+from semidense.cache.processes.locks import Lock, holder, try_lock
 
 if TYPE_CHECKING:
     import xarray
     import zarr
+    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, init=False)
@@ -104,7 +107,7 @@ class Store:
             EntryNotFound, DamagedEntry, InvalidKey, CacheUnavailable: as ``require`` does.
         """
         found = self._require(key)
-        from cache.reader import open_dataset
+        from semidense.cache.entries.reader import open_dataset
 
         return open_dataset(self.layout.entry(key), found)
 
@@ -115,9 +118,17 @@ class Store:
             EntryNotFound, DamagedEntry, InvalidKey, CacheUnavailable: as ``require`` does.
         """
         found = self._require(key)
-        from cache.reader import open_group
+        from semidense.cache.entries.reader import open_group
 
         return dict(open_group(self.layout.entry(key), found).arrays())
+
+    def read(self, key: str) -> "dict[str, NDArray[Any]]":
+        """Return all arrays of the entry, in memory; checked as ``require`` does.
+
+        Raises:
+            EntryNotFound, DamagedEntry, InvalidKey, CacheUnavailable: as ``require`` does.
+        """
+        return {name: np.asarray(array[...]) for name, array in self.arrays(key).items()}
 
     def _require(self, key: str) -> Finding:
         """Look at an entry; move it aside if it is damaged."""

@@ -1,8 +1,8 @@
 """Where scenes come from: benchmarks, file formats, and the typed objects they are read into.
 
-Names are imported when first used, so that `import datasets` costs next to nothing.
+Names are imported when first used, so that `from semidense import datasets` costs next to nothing.
 
->>> import datasets
+>>> from semidense import datasets
 >>> datasets.open_dataset("motorcycle").scenes[0].size
 (500, 741)
 """
@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from datasets.errors import (
+    from semidense.datasets.errors import (
         CalibrationError,
         DatasetError,
         ImageError,
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
         SceneNotFound,
         UnknownDatasetError,
     )
-    from datasets.formats.calib import CalibrationFile, read_calib
-    from datasets.formats.images import image_size, read_image
-    from datasets.formats.limits import MAX_PIXELS
-    from datasets.formats.pfm import read_pfm, write_pfm
-    from datasets.formats.png16 import read_png16, write_png16
-    from datasets.occlusion import left_right_check, warped_truth_mask
-    from datasets.registry import Dataset, describe, open_dataset
-    from datasets.scene import (
+    from semidense.datasets.formats.calib import CalibrationFile, read_calib
+    from semidense.datasets.formats.images import image_size, read_image
+    from semidense.datasets.formats.limits import MAX_PIXELS
+    from semidense.datasets.formats.pfm import read_pfm, write_pfm
+    from semidense.datasets.formats.png16 import read_png16, write_png16
+    from semidense.datasets.occlusion import left_right_check, warped_truth_mask
+    from semidense.datasets.registry import Dataset, describe, open_dataset
+    from semidense.datasets.scene import (
         IMAGE_ROLES,
         TRUTH_ROLES,
         Calibration,

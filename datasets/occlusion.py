@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from datasets.arrays import DisparityMap, Mask
+from semidense.datasets.arrays import DisparityMap, Mask
 
 
 def left_right_check(left_truth: DisparityMap, right_truth: DisparityMap, tolerance: float = 1.0) -> Mask:

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from datasets.arrays import DisparityMap, ImageArray, Mask
-from datasets.errors import CalibrationError, ImageError
-from datasets.formats.calib import CalibrationFile, read_calib
-from datasets.formats.images import image_size, read_image
-from datasets.formats.pfm import read_pfm
-from datasets.occlusion import left_right_check, warped_truth_mask
-from datasets.scene import MaskKind, Truth
+from semidense.datasets.arrays import DisparityMap, ImageArray, Mask
+from semidense.datasets.errors import CalibrationError, ImageError
+from semidense.datasets.formats.calib import CalibrationFile, read_calib
+from semidense.datasets.formats.images import image_size, read_image
+from semidense.datasets.formats.pfm import read_pfm
+from semidense.datasets.occlusion import left_right_check, warped_truth_mask
+from semidense.datasets.scene import MaskKind, Truth
 
 VISIBLE = 255
 """Value of the pixels visible in both views in every published mask; occluded ones have 128 or 0, unknown ones 0."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Protocol, cast
 
-from datasets.errors import DatasetError, SceneNotFound, UnknownDatasetError
-from datasets.scene import SceneSource
+from semidense.datasets.errors import DatasetError, SceneNotFound, UnknownDatasetError
+from semidense.datasets.scene import SceneSource
 
 
 @dataclass(frozen=True)
@@ -72,21 +72,29 @@ class _Lister(Protocol):
 class _Benchmark:
     pattern: str
     description: str
+    module: str
 
 
 _BENCHMARKS = {
-    "motorcycle": _Benchmark("motorcycle", "the Middlebury 2014 Motorcycle pair that scikit-image ships"),
+    "motorcycle": _Benchmark(
+        "motorcycle", "the Middlebury 2014 Motorcycle pair that scikit-image ships", "benchmarks.motorcycle"
+    ),
     "middlebury": _Benchmark(
         "middlebury:DIR",
         "Middlebury MiddEval3, 2014, 2001, 2003, 2005 or 2006: a scene, a collection or a root of several",
+        "benchmarks.middlebury",
     ),
-    "kitti2015": _Benchmark("kitti2015:DIR", "KITTI Stereo 2015: its root or its training folder"),
-    "eth3d": _Benchmark("eth3d:DIR", "ETH3D two-view: a scene, two_view_training or its parent"),
+    "kitti2015": _Benchmark("kitti2015:DIR", "KITTI Stereo 2015: its root or its training folder", "benchmarks.kitti"),
+    "eth3d": _Benchmark("eth3d:DIR", "ETH3D two-view: a scene, two_view_training or its parent", "benchmarks.eth3d"),
     "synthetic": _Benchmark(
-        "synthetic[:KEY=VALUE,...]", "rendered planes with exact truth; see datasets.synthetic for the keys"
+        "synthetic[:KEY=VALUE,...]",
+        "rendered planes with exact truth; see semidense.datasets.synthetic.scenes for the keys",
+        "synthetic.scenes",
     ),
     "pair": _Benchmark(
-        "pair:LEFT,RIGHT[,KEY=VALUE,...]", "your own: two files, folders or patterns, or pair:LIST.csv; see `match`"
+        "pair:LEFT,RIGHT[,KEY=VALUE,...]",
+        "your own: two files, folders or patterns, or pair:LIST.csv; see `match`",
+        "pairs.pair",
     ),
 }
 
@@ -108,7 +116,7 @@ def open_dataset(spec: str) -> Dataset:
         hint = f"did you mean {_BENCHMARKS[near[0]].pattern}?" if near else f"known are {', '.join(_patterns())}"
         raise UnknownDatasetError(f"no data set {name!r}; {hint}")
     # A benchmark's module is imported when it is asked for: listing the names must stay cheap.
-    lister = cast(_Lister, import_module(f"datasets.{name if name != 'kitti2015' else 'kitti'}"))
+    lister = cast(_Lister, import_module(f"semidense.datasets.{_BENCHMARKS[name].module}"))
     return Dataset(spec, lister.list_scenes(argument))
 
 

@@ -13,8 +13,8 @@ from typing import Any, Literal, Protocol, TypeAlias, cast
 
 import numpy as np
 
-from datasets.arrays import DisparityMap, ImageArray, Mask
-from datasets.errors import DatasetError, MissingFileError
+from semidense.datasets.arrays import DisparityMap, ImageArray, Mask
+from semidense.datasets.errors import DatasetError, MissingFileError
 
 Split: TypeAlias = Literal["train", "test"]
 RangeEnd: TypeAlias = Literal["minimum", "maximum"]

@@ -11,17 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cache import Store
-from datasets import Dataset, SceneSource, open_dataset
-from pipeline.attempts import attempt
-from pipeline.config import Config, parse_setting
-from pipeline.errors import UsageError
-from pipeline.opening import open_product
-from pipeline.plan import Plan, Planned, make_plan
-from pipeline.ranges import close_ranges
-from pipeline.steps import Request
-from pipeline.tasks import Made, Unwatched, Watch, provenance, read_arrays
-from pipeline.training_split import training_scenes
+from semidense.cache import Store
+from semidense.datasets import Dataset, SceneSource, open_dataset
+from semidense.pipeline.execution.retry import attempt
+from semidense.pipeline.execution.tasks import provenance
+from semidense.pipeline.execution.watch import Unwatched, Watch
+from semidense.pipeline.plan.config import Config, parse_setting
+from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.plan import Made, Plan, Planned, make_plan
+from semidense.pipeline.plan.ranges import close_ranges
+from semidense.pipeline.plan.steps import Request
+from semidense.pipeline.plan.training_split import training_scenes
+from semidense.pipeline.results.opening import open_product
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -170,19 +171,19 @@ def carry_out(
 
 def _metric_rows(plan: Plan, store: Store, made: Mapping[str, Made]) -> Iterator[dict[str, Any]]:
     """Yield the rows of every metrics product that was asked for."""
-    from stages.metrics import metric_rows
+    from semidense.stages.metrics import metric_rows
 
     for step_id, variant in plan.targets:
         each = made[step_id]
         if each.step.product == "metrics":
-            arrays = read_arrays(store, each.key)
+            arrays = store.read(each.key)
             named = {"variant": variant} if variant else {}
             yield from (row | named for row in metric_rows(each.step.scene, METHOD, each.step.R, arrays))
 
 
 def mask_kinds(result: Result) -> dict[str, str]:
     """Return where the non-occlusion mask of each scene of a run comes from."""
-    from pipeline.sources import MASK_KINDS
+    from semidense.pipeline.plan.images_and_truth import MASK_KINDS
 
     truths = [made for made in result.made.values() if made.step.product == "truth"]
     return {

@@ -4,17 +4,16 @@ The declarations stand beside what can be set for them; the functions that they 
 when something is computed.
 """
 
-from stages.baselines.declaration import BASELINES
-from stages.disparity_declaration import DISPARITY
-from stages.evaluation.calibration_declaration import CALIBRATED_CONFIDENCE, CALIBRATION
-from stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
-from stages.filtering import SEMIDENSE
-from stages.finishing.declaration import FILLED, REFINED, RIGHT_DISPARITY
-from stages.matching.declaration import COST_VOLUME, DESCRIPTOR_NET, MATCHING_NET, MATCHING_SAMPLES
-from stages.metrics import METRICS
-from stages.stage import Stage
-from stages.survey import SURVEY
-from stages.transforms.declaration import CHANNELS
+from semidense.stages.baselines.declaration import BASELINES
+from semidense.stages.disparity.declaration import DISPARITY, FILLED, REFINED, RIGHT_DISPARITY
+from semidense.stages.disparity.survey import SURVEY
+from semidense.stages.evaluation.calibration.declaration import CALIBRATED_CONFIDENCE, CALIBRATION
+from semidense.stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
+from semidense.stages.evaluation.filtering import SEMIDENSE
+from semidense.stages.matching.declaration import COST_VOLUME, DESCRIPTOR_NET, MATCHING_NET, MATCHING_SAMPLES
+from semidense.stages.metrics import METRICS
+from semidense.stages.stage import Stage
+from semidense.stages.transforms.declaration import CHANNELS
 
 CATALOG: tuple[Stage, ...] = (
     SURVEY,

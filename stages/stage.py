@@ -128,6 +128,12 @@ class Stage:
         """Name of the module whose code, with all it imports, makes the product."""
         return self.compute.partition(":")[0]
 
+    def tiling(self, params: Params) -> str:
+        """Say how the image is cut: it decides the order of sums, and which files there are."""
+        if self.tile_rows is None:
+            return "whole"
+        return f"{self.tile_rows} rows, halo {self.halo(params)}, {self.border}"
+
     def function(self) -> Callable[..., Arrays]:
         """Import and return the function that ``compute`` names."""
         module, _, name = self.compute.partition(":")

@@ -13,7 +13,7 @@ import pytest
 from tests.tiny import NETS, SETTINGS, SPEC
 
 if TYPE_CHECKING:  # the package is imported when it is used: most tests do without torch
-    from pipeline.api import Result, Task
+    from semidense.pipeline.api import Result, Task
 
 PROJECT = Path(__file__).parents[1]
 
@@ -36,7 +36,7 @@ def project() -> Path:
 @pytest.fixture(scope="session")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> "Result":
     """A whole run with training, in a cache that tests must not change."""
-    from pipeline.api import Task, run
+    from semidense.pipeline.api import Task, run
 
     return run(Task(SPEC, settings=SETTINGS, train=True, cache=tmp_path_factory.mktemp("trained") / "cache"))
 
@@ -44,7 +44,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> "Result":
 @pytest.fixture(scope="session")
 def trained_task(trained: "Result") -> "Task":
     """The task that ``trained`` carried out."""
-    from pipeline.api import Task
+    from semidense.pipeline.api import Task
 
     return Task(SPEC, settings=SETTINGS, train=True, cache=trained.store.root)
 
@@ -64,8 +64,8 @@ def own_task(trained_task: "Task", own_cache: Path) -> "Task":
 @pytest.fixture
 def weights(trained: "Result", tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder of weights that stand in for those of the package."""
-    from pipeline import shipped
-    from stages.weights import save_weights
+    from semidense.pipeline.plan import shipped_weights as shipped
+    from semidense.stages.weights import save_weights
 
     folder = tmp_path / "weights"
     folder.mkdir()
@@ -82,7 +82,7 @@ def weights(trained: "Result", tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.fixture
 def invoke(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Ran]]:
     """Run a command through the entry point, in this process."""
-    from pipeline.cli import main
+    from semidense.pipeline.cli.main import main
 
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
@@ -99,15 +99,16 @@ def invoke(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) 
         signal.signal(number, handler)
 
 
-ENTRY = [sys.executable, "-c", "from pipeline.cli import main; main()"]
+ENTRY = [sys.executable, "-c", "from semidense.pipeline.cli.main import main; main()"]
 
 
 @pytest.fixture(scope="session")
 def start() -> Callable[..., "subprocess.Popen[str]"]:
     """Start a command in a process of its own."""
 
-    def popen(*arguments: object, sources: Path = PROJECT, cwd: Path | None = None) -> "subprocess.Popen[str]":
-        environment = {**os.environ, "PYTHONPATH": str(sources), "PYTHONSAFEPATH": "1"}
+    def popen(*arguments: object, sources: Path | None = None, cwd: Path | None = None) -> "subprocess.Popen[str]":
+        own = {"PYTHONPATH": str(sources)} if sources else {}
+        environment = {**os.environ, **own, "PYTHONSAFEPATH": "1"}
         command: Sequence[str] = [*ENTRY, *map(str, arguments)]
         pipe = subprocess.PIPE
         return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment, cwd=cwd)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cache import Entry, Recipe, Store
-from stages.disparity import winner_take_all
+from semidense.cache import Entry, Recipe, Store
+from semidense.stages.disparity.winner_takes_all import winner_take_all
 
 SHAPES = {
     "left": ("y", "x", "band"), "right": ("y", "x", "band"), "moments": ("view", "moment"), "mask_kind": ("kind",),

@@ -1,6 +1,6 @@
 """The smallest run of the whole path: three scenes of 64 x 80 px, 9 disparities, two steps of training a network."""
 
-from stages.catalog import STAGES
+from semidense.stages.catalog import STAGES
 
 
 def _above(product: str) -> set[str]:

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from datasets.errors import CalibrationError, MissingFileError
-from datasets.scene import Calibration
+from semidense.datasets.errors import CalibrationError, MissingFileError
+from semidense.datasets.scene import Calibration
 
 _LARGEST_FILE = 1 << 16
 _Value = TypeVar("_Value")

@@ -1,6 +1,6 @@
 """Read the calibration of a rectified pair in the files that people have.
 
-- Middlebury's ``calib.txt``, in millimetres; see `datasets.formats.calib`;
+- Middlebury's ``calib.txt``, in millimetres; see `semidense.datasets.formats.calib`;
 - an OpenCV ``FileStorage``, YAML or XML, with ``P1`` and ``P2``, or ``Q``, as ``cv2.stereoRectify`` gives them; its
   unit is that of the calibration board's squares, which the file does not tell;
 - a pair of ROS ``CameraInfo`` files, left and right: what ``camera_calibration`` writes, or a message as YAML, in
@@ -21,9 +21,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from datasets.errors import CalibrationError, MissingFileError
-from datasets.formats.calib import read_calib
-from datasets.scene import Calibration
+from semidense.datasets.errors import CalibrationError, MissingFileError
+from semidense.datasets.formats.calib import read_calib
+from semidense.datasets.scene import Calibration
 
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
 """Millimetres of each unit that a calibration may be in."""

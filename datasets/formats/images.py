@@ -17,9 +17,9 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 from PIL.ImageFile import ImageFile
 
-from datasets.arrays import ImageArray
-from datasets.errors import ImageError, MissingFileError
-from datasets.formats.limits import check_pixels
+from semidense.datasets.arrays import ImageArray
+from semidense.datasets.errors import ImageError, MissingFileError
+from semidense.datasets.formats.limits import check_pixels
 
 # The size is judged by `check_pixels`, in one line; Pillow's warning would be a second one.
 warnings.filterwarnings("ignore", category=Image.DecompressionBombWarning)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from datasets.errors import DatasetError
+from semidense.datasets.errors import DatasetError
 
 MAX_PIXELS = 64 * 1024 * 1024
 """The most pixels an image or a disparity map may have: ten times a full-size Middlebury image."""

@@ -12,10 +12,10 @@ from typing import BinaryIO
 
 import numpy as np
 
-from datasets.arrays import DisparityMap
-from datasets.errors import MissingFileError, PfmError
-from datasets.formats.atomic import atomic_write
-from datasets.formats.limits import check_pixels
+from semidense.datasets.arrays import DisparityMap
+from semidense.datasets.errors import MissingFileError, PfmError
+from semidense.datasets.formats.atomic import atomic_write
+from semidense.datasets.formats.limits import check_pixels
 
 _LONGEST_LINE = 80
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datasets.errors import DatasetError
-from datasets.formats.atomic import atomic_write
+from semidense.datasets.errors import DatasetError
+from semidense.datasets.formats.atomic import atomic_write
 
 _VERTEX = np.dtype([*((axis, "<f4") for axis in "xyz"), *((band, "u1") for band in ("red", "green", "blue"))])
 _PROPERTIES = (

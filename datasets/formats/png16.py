@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from datasets.arrays import DisparityMap
-from datasets.errors import Png16Error
-from datasets.formats.atomic import atomic_write
-from datasets.formats.images import read_image
-from datasets.formats.limits import check_pixels
+from semidense.datasets.arrays import DisparityMap
+from semidense.datasets.errors import Png16Error
+from semidense.datasets.formats.atomic import atomic_write
+from semidense.datasets.formats.images import read_image
+from semidense.datasets.formats.limits import check_pixels
 
 if TYPE_CHECKING:
     from PIL.PngImagePlugin import PngInfo

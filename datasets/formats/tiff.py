@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from datasets.errors import ImageError
-from datasets.formats.atomic import atomic_write
-from datasets.formats.limits import check_pixels
+from semidense.datasets.errors import ImageError
+from semidense.datasets.formats.atomic import atomic_write
+from semidense.datasets.formats.limits import check_pixels
 
 
 def write_tiff(

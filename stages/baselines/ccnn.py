@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from stages.baselines.declaration import CCNN_RADIUS, CcnnParams
-from stages.baselines.learning import labelled_scenes
-from stages.evaluation.net import DISPARITY_UNIT
-from stages.evaluation.samples import UNKNOWN
-from stages.parameters import from_vector, initialise, to_vector
-from stages.schedule import SHARDS
-from stages.stage import Arrays, Inputs, Monitor, NoParams, Silent
-from stages.threads import one_thread
-from stages.training import balanced_cross_entropy, fit
+from semidense.stages.baselines.declaration import CCNN_RADIUS, CcnnParams
+from semidense.stages.baselines.learning import labelled_scenes
+from semidense.stages.compute.threads import one_thread
+from semidense.stages.evaluation.net import DISPARITY_UNIT
+from semidense.stages.evaluation.samples import UNKNOWN
+from semidense.stages.learning.parameters import from_vector, initialise, to_vector
+from semidense.stages.learning.schedule import SHARDS
+from semidense.stages.learning.training import balanced_cross_entropy, fit
+from semidense.stages.stage import Arrays, Inputs, Monitor, NoParams, Silent
 
 
 class Ccnn(nn.Module):

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.baselines.declaration import CENSUS_WINDOW, WindowParams
-from stages.baselines.window import match_windows
-from stages.stage import Arrays, Inputs
-from stages.transforms.census import census_transform, hamming
-from stages.transforms.gray import to_gray
+from semidense.stages.baselines.declaration import CENSUS_WINDOW, WindowParams
+from semidense.stages.baselines.window import match_windows
+from semidense.stages.stage import Arrays, Inputs
+from semidense.stages.transforms.census import census_transform, hamming
+from semidense.stages.transforms.gray import to_gray
 
 
 def compute_census(params: WindowParams, inputs: Inputs) -> Arrays:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.baselines.declaration import CostConfidenceParams, require_odd
-from stages.kernel import kernel
-from stages.stage import Arrays, Inputs, require_shape
+from semidense.stages.baselines.declaration import CostConfidenceParams, require_odd
+from semidense.stages.compute.kernel import kernel
+from semidense.stages.stage import Arrays, Inputs, require_shape
 
 EPSILON = np.float32(1e-3)
 """Added to what is divided: a cost of 0 would make every ratio infinite, however near the rival is."""

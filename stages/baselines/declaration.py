@@ -2,8 +2,8 @@
 
 from pydantic import Field, field_validator, model_validator
 
-from stages.schedule import SHARDS, Schedule
-from stages.stage import Output, Params, Stage, StageError
+from semidense.stages.learning.schedule import SHARDS, Schedule
+from semidense.stages.stage import Output, Params, Stage, StageError
 
 _DENSE = Output("dense", ("y", "x"), "float32", "px", "disparity of every pixel, before anything is filtered")
 _CHECKED = Output("disparity", ("y", "x"), "float32", "px", "disparity after the matcher's own checks; NaN: dropped")
@@ -103,7 +103,7 @@ SGM = Stage(
     product="sgm",
     inputs=("images",),
     outputs=(_DENSE, _CHECKED),
-    compute="stages.baselines.sgm:compute_sgm",
+    compute="semidense.stages.baselines.sgm:compute_sgm",
     params=SgmParams,
     needs=("opencv-python-headless",),
 )
@@ -113,7 +113,7 @@ CENSUS = Stage(
     product="census",
     inputs=("images",),
     outputs=(_DENSE, _CHECKED),
-    compute="stages.baselines.census:compute_census",
+    compute="semidense.stages.baselines.census:compute_census",
     params=WindowParams,
     tile_rows=64,
     halo=lambda params: CENSUS_WINDOW[0] // 2 + params.window // 2,
@@ -124,7 +124,7 @@ SNCC = Stage(
     product="sncc",
     inputs=("images",),
     outputs=(_DENSE, _CHECKED),
-    compute="stages.baselines.sncc:compute_sncc",
+    compute="semidense.stages.baselines.sncc:compute_sncc",
     params=WindowParams,
     tile_rows=64,
     halo=lambda params: NCC_WINDOW // 2 + params.window // 2,
@@ -140,7 +140,7 @@ COST_CONFIDENCE = Stage(
         Output("lrd", ("y", "x"), "float32", "1", "margin of the least cost over its left-right difference"),
         Output("msm", ("y", "x"), "float32", "1", "the least cost itself, with the sign turned"),
     ),
-    compute="stages.baselines.cost_confidence:compute_cost_confidence",
+    compute="semidense.stages.baselines.cost_confidence:compute_cost_confidence",
     params=CostConfidenceParams,
     tile_rows=32,
     halo=lambda params: params.window // 2,
@@ -181,7 +181,7 @@ MC_CNN = Stage(
     product="mc_cnn",
     inputs=("images",),
     outputs=(_DENSE, _CHECKED),
-    compute="stages.baselines.mc_cnn:compute_mc_cnn",
+    compute="semidense.stages.baselines.mc_cnn:compute_mc_cnn",
     params=CheckedParams,
     needs=("mccnn",),
 )
@@ -191,7 +191,7 @@ MC_CNN_ACCURATE = Stage(
     product="mc_cnn_accurate",
     inputs=("images",),
     outputs=(_DENSE, _CHECKED),
-    compute="stages.baselines.mc_cnn:compute_mc_cnn_accurate",
+    compute="semidense.stages.baselines.mc_cnn:compute_mc_cnn_accurate",
     params=CheckedParams,
     tile_rows=32,
     halo=lambda _: MC_CNN_RADIUS,
@@ -210,7 +210,7 @@ O1_FOREST = Stage(
         Output("upper", ("node",), "int32", "1", "node of the upper child"),
         Output("right", ("node",), "float32", "1", "share of right disparities among the node's samples"),
     ),
-    compute="stages.baselines.o1:train_forest",
+    compute="semidense.stages.baselines.o1:train_forest",
     params=ForestParams,
     scope="split",
     needs=("scikit-learn",),
@@ -220,7 +220,7 @@ O1 = Stage(
     product="o1",
     inputs=("disparity", "o1_forest"),
     outputs=(_CONFIDENCE,),
-    compute="stages.baselines.o1:compute_o1",
+    compute="semidense.stages.baselines.o1:compute_o1",
     tile_rows=128,
     halo=lambda _: O1_SIDES[-1] // 2,
 )
@@ -232,7 +232,7 @@ CCNN_NET = Stage(
         Output("parameters", ("parameter",), "float32", "1", "weights of the CCNN"),
         Output("loss", ("step",), "float32", "1", "class-balanced cross-entropy of each training step"),
     ),
-    compute="stages.baselines.ccnn:train_ccnn",
+    compute="semidense.stages.baselines.ccnn:train_ccnn",
     params=CcnnParams,
     scope="split",
     monitored=True,
@@ -242,7 +242,7 @@ CCNN = Stage(
     product="ccnn",
     inputs=("disparity", "ccnn_net"),
     outputs=(_CONFIDENCE,),
-    compute="stages.baselines.ccnn:compute_ccnn",
+    compute="semidense.stages.baselines.ccnn:compute_ccnn",
     tile_rows=128,
     halo=lambda _: CCNN_RADIUS,
     border="edge",

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.evaluation.samples import UNKNOWN, label_pixels
-from stages.stage import Inputs, StageError, by_scene
+from semidense.stages.evaluation.samples import UNKNOWN, label_pixels
+from semidense.stages.stage import Inputs, StageError, by_scene
 
 
 def labelled_scenes(inputs: Inputs, tolerance: float) -> list[tuple[NDArray[np.float32], NDArray[np.int8]]]:

@@ -11,11 +11,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from stages.baselines.declaration import MC_CNN_RADIUS, CheckedParams
-from stages.baselines.window import match_windows
-from stages.stage import Arrays, Inputs
-from stages.threads import one_thread
-from stages.transforms.gray import to_gray
+from semidense.stages.baselines.declaration import MC_CNN_RADIUS, CheckedParams
+from semidense.stages.baselines.window import match_windows
+from semidense.stages.compute.threads import one_thread
+from semidense.stages.stage import Arrays, Inputs
+from semidense.stages.transforms.gray import to_gray
 
 _FAST, _ACCURATE = "mc_cnn_fast_mb_weights.pt", "mc_cnn_accurate_mb_weights.pt"
 

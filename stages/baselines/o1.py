@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.baselines.declaration import O1_SIDES, ForestParams
-from stages.baselines.learning import draw_pixels, labelled_scenes
-from stages.kernel import kernel
-from stages.stage import Arrays, Inputs, NoParams, StageError, require_shape
+from semidense.stages.baselines.declaration import O1_SIDES, ForestParams
+from semidense.stages.baselines.learning import draw_pixels, labelled_scenes
+from semidense.stages.compute.kernel import kernel
+from semidense.stages.stage import Arrays, Inputs, NoParams, StageError, require_shape
 
 FEATURES = 5 * len(O1_SIDES)
 """Five features for each window."""

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.baselines.declaration import SgmParams
-from stages.stage import Arrays, Inputs
-from stages.transforms.gray import to_gray
+from semidense.stages.baselines.declaration import SgmParams
+from semidense.stages.stage import Arrays, Inputs
+from semidense.stages.transforms.gray import to_gray
 
 _UNITS = 16
 """OpenCV's disparities are whole multiples of 1/16 px, and their number must be a multiple of 16 too."""

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.baselines.declaration import NCC_WINDOW, WindowParams
-from stages.baselines.window import box_mean, match_windows
-from stages.stage import Arrays, Inputs
-from stages.transforms.gray import to_gray
+from semidense.stages.baselines.declaration import NCC_WINDOW, WindowParams
+from semidense.stages.baselines.window import box_mean, match_windows
+from semidense.stages.stage import Arrays, Inputs
+from semidense.stages.transforms.gray import to_gray
 
 _RADIUS = NCC_WINDOW // 2
 _FLAT = np.float32(1e-3)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.kernel import kernel
+from semidense.stages.compute.kernel import kernel
 
 Planes = Callable[[int, slice, slice], NDArray[np.float32]]
 """``costs(d, left, right)``: float32 (y, column), the cost of each left column of a slice with its right column."""

@@ -7,9 +7,9 @@ sees that only roughly, after poolings; counted exactly, it weighs in beside the
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.evaluation.declaration import RADIUS
-from stages.kernel import kernel
-from stages.stage import StageError, require_shape
+from semidense.stages.compute.kernel import kernel
+from semidense.stages.evaluation.declaration import RADIUS
+from semidense.stages.stage import StageError, require_shape
 
 TOLERANCE = 1.0
 """Largest difference of two disparities that agree, px: what counts as right elsewhere, too."""

@@ -4,15 +4,15 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from stages.allocator import keep_freed_memory
-from stages.evaluation.agreement import padded_agreement
-from stages.evaluation.declaration import RADIUS, ConfidenceParams
-from stages.evaluation.layers import evaluation_layers
-from stages.evaluation.net import EvaluationNet
-from stages.parameters import from_vector
-from stages.precision import Precision, autocast
-from stages.stage import Array, Inputs, require_shape
-from stages.threads import one_thread
+from semidense.stages.compute.allocator import keep_freed_memory
+from semidense.stages.compute.precision import Precision, autocast
+from semidense.stages.compute.threads import one_thread
+from semidense.stages.evaluation.agreement import padded_agreement
+from semidense.stages.evaluation.declaration import RADIUS, ConfidenceParams
+from semidense.stages.evaluation.layers import evaluation_layers
+from semidense.stages.evaluation.net import EvaluationNet
+from semidense.stages.learning.parameters import from_vector
+from semidense.stages.stage import Array, Inputs, require_shape
 
 
 def confidence(

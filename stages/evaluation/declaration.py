@@ -4,10 +4,10 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
-from stages.precision import Precision
-from stages.schedule import SHARDS, Schedule
-from stages.stage import Output, Params, Stage
-from stages.transforms.window import require_window
+from semidense.stages.compute.precision import Precision
+from semidense.stages.learning.schedule import SHARDS, Schedule
+from semidense.stages.stage import Output, Params, Stage
+from semidense.stages.transforms.window import require_window
 
 PATCH = 101
 """Side of the square patch that one answer of the evaluation-Net stands for, in pixels."""
@@ -75,7 +75,7 @@ EVALUATION_SAMPLES = Stage(
         Output("x", ("sample",), "int32", "px", "column of the grid's first pixel"),
         Output("labels", ("sample", "row", "column"), "int8", "1", "1 right, 0 wrong, -1 unknown"),
     ),
-    compute="stages.evaluation.samples:draw_samples",
+    compute="semidense.stages.evaluation.samples:draw_samples",
     params=EvaluationSamplesParams,
     scope="split",
 )
@@ -87,7 +87,7 @@ EVALUATION_NET = Stage(
         Output("parameters", ("parameter",), "float32", "1", "weights of the evaluation-Net"),
         Output("loss", ("step",), "float32", "1", "class-balanced cross-entropy of each training step"),
     ),
-    compute="stages.evaluation.train:train_evaluation_net",
+    compute="semidense.stages.evaluation.train:train_evaluation_net",
     params=EvaluationNetParams,
     scope="split",
     monitored=True,
@@ -101,7 +101,7 @@ CONFIDENCE = Stage(
         Output("network", ("y", "x"), "float32", "1", "probability by the evaluation-Net alone, in [0, 1]"),
         Output("agreement", ("y", "x"), "float32", "1", "share of the window with the same disparity, in (0, 1]"),
     ),
-    compute="stages.evaluation.confidence:compute_confidence",
+    compute="semidense.stages.evaluation.confidence:compute_confidence",
     params=ConfidenceParams,
     tile_rows=256,
     halo=lambda _: RADIUS,

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.evaluation.net import DISPARITY_UNIT
-from stages.stage import Array, StageError
-from stages.transforms.gray import to_gray
+from semidense.stages.evaluation.net import DISPARITY_UNIT
+from semidense.stages.stage import Array, StageError
+from semidense.stages.transforms.gray import to_gray
 
 
 def evaluation_layers(left: Array, moments: NDArray[np.float64], disparity: NDArray[np.float32]) -> NDArray[np.float32]:

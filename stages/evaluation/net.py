@@ -25,7 +25,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from stages.evaluation.declaration import PATCH, STRIDE
+from semidense.stages.evaluation.declaration import PATCH, STRIDE
 
 DISPARITY_UNIT = 5.0
 """Disparities, in px, are divided by this: one scale for all scenes, on which an error of 1 px still shows."""

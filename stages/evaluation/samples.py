@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.evaluation.declaration import STRIDE, EvaluationSamplesParams
-from stages.stage import Inputs, StageError, by_scene
+from semidense.stages.evaluation.declaration import STRIDE, EvaluationSamplesParams
+from semidense.stages.stage import Inputs, StageError, by_scene
 
 UNKNOWN = -1
 """Label of a pixel whose truth is not known, or that lies outside the image."""

@@ -7,15 +7,15 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from stages.augmentation import relight
-from stages.evaluation.declaration import PATCH, RADIUS, STRIDE, EvaluationNetParams
-from stages.evaluation.layers import evaluation_layers
-from stages.evaluation.net import EvaluationNet
-from stages.parameters import initialise, to_vector
-from stages.precision import autocast
-from stages.schedule import SHARDS
-from stages.stage import Arrays, Inputs, Monitor, Silent, by_scene
-from stages.training import balanced_cross_entropy, fit
+from semidense.stages.compute.precision import autocast
+from semidense.stages.evaluation.declaration import PATCH, RADIUS, STRIDE, EvaluationNetParams
+from semidense.stages.evaluation.layers import evaluation_layers
+from semidense.stages.evaluation.net import EvaluationNet
+from semidense.stages.learning.augmentation import relight
+from semidense.stages.learning.parameters import initialise, to_vector
+from semidense.stages.learning.schedule import SHARDS
+from semidense.stages.learning.training import balanced_cross_entropy, fit
+from semidense.stages.stage import Arrays, Inputs, Monitor, Silent, by_scene
 
 Sides = tuple[NDArray[np.float32], NDArray[np.float32]]
 """The layers (layer, y, x) of the left view and its map, and of the right view and its map, mirrored."""

@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from stages.allocator import keep_freed_memory
-from stages.matching.declaration import RADIUS, CostVolumeParams
-from stages.matching.descriptor_net import descriptor_net_from_parameters
-from stages.matching.fast import padded_fast_costs
-from stages.matching.guided import padded_guided_costs
-from stages.matching.net import SIDES, MatchingNet, net_from_parameters, require_views
-from stages.matching.transformed import TransformedNet, is_transformable, run_blocks
-from stages.matching.winograd import TILE
-from stages.precision import Precision, autocast, dtype_of
-from stages.stage import Inputs, require_shape
-from stages.threads import one_thread
+from semidense.stages.compute.allocator import keep_freed_memory
+from semidense.stages.compute.precision import Precision, autocast, dtype_of
+from semidense.stages.compute.threads import one_thread
+from semidense.stages.matching.declaration import RADIUS, CostVolumeParams
+from semidense.stages.matching.descriptors.net import descriptor_net_from_parameters
+from semidense.stages.matching.descriptors.volume import padded_fast_costs
+from semidense.stages.matching.guided.volume import padded_guided_costs
+from semidense.stages.matching.net import SIDES, MatchingNet, net_from_parameters, require_views
+from semidense.stages.matching.winograd.tiles import TILE
+from semidense.stages.matching.winograd.volume import TransformedNet, is_transformable, run_blocks
+from semidense.stages.stage import Inputs, require_shape
 
 ROWS, COLUMNS = 32, 64
 """Cells computed at once: few enough for all that is in between to stay in the processor's cache."""

@@ -14,11 +14,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from stages.augmentation import relight
-from stages.matching.declaration import RADIUS
-from stages.matching.samples import ABSENT
-from stages.stage import Arrays
-from stages.training import balanced_cross_entropy
+from semidense.stages.learning.augmentation import relight
+from semidense.stages.learning.training import balanced_cross_entropy
+from semidense.stages.matching.declaration import RADIUS
+from semidense.stages.matching.samples import ABSENT
+from semidense.stages.stage import Arrays
 
 IGNORED = -1
 

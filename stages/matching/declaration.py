@@ -4,9 +4,9 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from stages.precision import Precision
-from stages.schedule import SHARDS, Schedule
-from stages.stage import Output, Params, Stage, StageError
+from semidense.stages.compute.precision import Precision
+from semidense.stages.learning.schedule import SHARDS, Schedule
+from semidense.stages.stage import Output, Params, Stage, StageError
 
 Form = Literal["dense", "patch"]
 Head = Literal["compact", "paper"]
@@ -141,7 +141,7 @@ MATCHING_SAMPLES = Stage(
         ),
         Output("truth", ("sample", "row", "column"), "float32", "px", "true disparity where both views see the pixel"),
     ),
-    compute="stages.matching.samples:draw_samples",
+    compute="semidense.stages.matching.samples:draw_samples",
     params=MatchingSamplesParams,
     scope="split",
 )
@@ -153,7 +153,7 @@ MATCHING_NET = Stage(
         Output("parameters", ("parameter",), "float32", "1", "weights and channel scales of the matching-Net"),
         Output("loss", ("step",), "float32", "1", "loss of each training step"),
     ),
-    compute="stages.matching.train:train_matching_net",
+    compute="semidense.stages.matching.train:train_matching_net",
     params=MatchingNetParams,
     scope="split",
     monitored=True,
@@ -166,7 +166,7 @@ DESCRIPTOR_NET = Stage(
         Output("parameters", ("parameter",), "float32", "1", "weights and channel scales of the descriptor-Net"),
         Output("loss", ("step",), "float32", "1", "loss of each training step"),
     ),
-    compute="stages.matching.descriptor_training:train_descriptor_net",
+    compute="semidense.stages.matching.descriptors.training:train_descriptor_net",
     params=DescriptorNetParams,
     scope="split",
     monitored=True,
@@ -179,7 +179,7 @@ COST_VOLUME = Stage(
         Output("cost", ("y", "x", "d"), "float16", "1", "log-odds of a mismatch; lower is better", {"x": 256}),
         Output("d", ("d",), "int16", "px", "disparity: x_right = x_left - d"),
     ),
-    compute="stages.matching.cost_volume:compute_costs",
+    compute="semidense.stages.matching.cost_volume:compute_costs",
     params=CostVolumeParams,
     tile_rows=32,
     halo=lambda params: params.context,

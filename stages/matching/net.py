@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from stages.matching.declaration import Head
-from stages.parameters import count, from_vector
-from stages.precision import autocast
-from stages.stage import StageError
+from semidense.stages.compute.precision import autocast
+from semidense.stages.learning.parameters import count, from_vector
+from semidense.stages.matching.declaration import Head
+from semidense.stages.stage import StageError
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")

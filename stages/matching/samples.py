@@ -20,8 +20,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.matching.declaration import MatchingSamplesParams
-from stages.stage import Arrays, Inputs, StageError, by_scene
+from semidense.stages.matching.declaration import MatchingSamplesParams
+from semidense.stages.stage import Arrays, Inputs, StageError, by_scene
 
 NEAR = 6
 """Largest distance from the truth, in pixels, of a mismatch that is drawn beside it."""

@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from stages.matching.crops import Crop, cells_loss, cut_crop, measure_channels
-from stages.matching.declaration import MatchingNetParams
-from stages.matching.net import SIDES, MatchingNet
-from stages.matching.transformed import TransformedNet, is_transformable
-from stages.matching.transformed_training import joined_units
-from stages.matching.winograd import TILE
-from stages.parameters import initialise, to_vector
-from stages.precision import Precision, autocast
-from stages.schedule import SHARDS
-from stages.stage import Inputs, Monitor, Silent, by_scene
-from stages.training import fit
+from semidense.stages.compute.precision import Precision, autocast
+from semidense.stages.learning.parameters import initialise, to_vector
+from semidense.stages.learning.schedule import SHARDS
+from semidense.stages.learning.training import fit
+from semidense.stages.matching.crops import Crop, cells_loss, cut_crop, measure_channels
+from semidense.stages.matching.declaration import MatchingNetParams
+from semidense.stages.matching.net import SIDES, MatchingNet
+from semidense.stages.matching.winograd.tiles import TILE
+from semidense.stages.matching.winograd.training import joined_units
+from semidense.stages.matching.winograd.volume import TransformedNet, is_transformable
+from semidense.stages.stage import Inputs, Monitor, Silent, by_scene
 
 
 def train_matching_net(

@@ -1,15 +1,8 @@
 """How good a disparity map is, and how well a confidence tells its right pixels from its wrong ones."""
 
-from stages.metrics.confidence import (
-    ErrorCurve,
-    Ranking,
-    auc,
-    error_at_density,
-    error_curve,
-    optimal_auc,
-)
-from stages.metrics.errors import QUANTILES, Errors, avgerr, bad, error_quantiles, invalid, raw_bad, rms
-from stages.metrics.stage import MASKS, METRICS, THRESHOLDS, metric_rows
+from semidense.stages.metrics.confidence import ErrorCurve, Ranking, auc, error_at_density, error_curve, optimal_auc
+from semidense.stages.metrics.errors import QUANTILES, Errors, avgerr, bad, error_quantiles, invalid, raw_bad, rms
+from semidense.stages.metrics.stage import MASKS, METRICS, THRESHOLDS, metric_rows
 
 __all__ = [
     "MASKS",

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.filtering import require_share
-from stages.metrics.errors import Errors, counted, require_equal
-from stages.stage import StageError
+from semidense.stages.evaluation.filtering import require_share
+from semidense.stages.metrics.errors import Errors, counted, require_equal
+from semidense.stages.stage import StageError
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.stage import Array, StageError
+from semidense.stages.stage import Array, StageError
 
 QUANTILES = {"A50": 0.50, "A90": 0.90, "A95": 0.95, "A99": 0.99}
 """Shares of the reported pixels whose largest error is given."""

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.metrics.confidence import Ranking, optimal_auc
-from stages.metrics.errors import QUANTILES, Errors, counted, require_equal
-from stages.stage import Array, Arrays, Inputs, NoParams, Output, Stage
+from semidense.stages.metrics.confidence import Ranking, optimal_auc
+from semidense.stages.metrics.errors import QUANTILES, Errors, counted, require_equal
+from semidense.stages.stage import Array, Arrays, Inputs, NoParams, Output, Stage
 
 MASKS = ("nonocc", "all")
 """The order of the mask axis: pixels visible in both views, and all pixels; both only where the truth is known."""
@@ -148,7 +148,7 @@ METRICS = Stage(
         # One array: as one each, the figures would take more time to store than to work out.
         Output("figures", ("figure", "mask", "threshold"), "float64", "1", f"{', '.join(FIGURES)}; of {_AXES}"),
     ),
-    compute="stages.metrics.stage:compute_metrics",
+    compute="semidense.stages.metrics.stage:compute_metrics",
 )
 """The figures of a scene, in the order of ``FIGURES``, of ``MASKS`` and of ``THRESHOLDS``. ``truth`` has ``disparity``
 (y, x) float32, NaN unknown, and ``nonocc`` (y, x) bool. Not tiled: a quantile and a ranking are not sums over tiles."""

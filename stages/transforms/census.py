@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.kernel import inlined, kernel
+from semidense.stages.compute.kernel import inlined, kernel
 
 
 def census_transform(gray: NDArray[Any], window: tuple[int, int]) -> NDArray[np.uint64]:

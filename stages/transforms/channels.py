@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.stage import Array, Arrays, Inputs, StageError
-from stages.transforms.companion import companion
-from stages.transforms.declaration import ChannelsParams
-from stages.transforms.gray import gray_moments, to_gray
-from stages.transforms.rank import rank
+from semidense.stages.stage import Array, Arrays, Inputs, StageError
+from semidense.stages.transforms.companion import companion
+from semidense.stages.transforms.declaration import ChannelsParams
+from semidense.stages.transforms.gray import gray_moments, to_gray
+from semidense.stages.transforms.rank import rank
 
 
 def channels(

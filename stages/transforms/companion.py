@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.kernel import kernel
-from stages.transforms.gray import require_gray
-from stages.transforms.rays import LINES, require_rays
-from stages.transforms.window import require_window
+from semidense.stages.compute.kernel import kernel
+from semidense.stages.transforms.gray import require_gray
+from semidense.stages.transforms.rays import LINES, require_rays
+from semidense.stages.transforms.window import require_window
 
 
 def companion(gray: NDArray[np.uint8], window: int = 61, rays: int = 8) -> NDArray[np.float32]:

@@ -4,9 +4,9 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
-from stages.stage import Output, Params, Stage
-from stages.transforms.rays import require_rays
-from stages.transforms.window import require_window
+from semidense.stages.stage import Output, Params, Stage
+from semidense.stages.transforms.rays import require_rays
+from semidense.stages.transforms.window import require_window
 
 Channel = Literal["gray", "rank", "companion"]
 ORDER: tuple[Channel, ...] = ("gray", "rank", "companion")
@@ -59,7 +59,7 @@ CHANNELS = Stage(
             "views left, right; channels gray, rank, companion or those of them in use",
         ),
     ),
-    compute="stages.transforms.channels:compute_channels",
+    compute="semidense.stages.transforms.channels:compute_channels",
     params=ChannelsParams,
     tile_rows=128,
     halo=lambda params: params.reach,

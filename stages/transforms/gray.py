@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.stage import StageError
+from semidense.stages.stage import StageError
 
 LUMA = (299, 587, 114)
 """ITU-R BT.601 weights of red, green and blue, in thousandths."""

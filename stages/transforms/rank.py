@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.kernel import kernel
-from stages.transforms.gray import require_gray
-from stages.transforms.window import require_window
+from semidense.stages.compute.kernel import kernel
+from semidense.stages.transforms.gray import require_gray
+from semidense.stages.transforms.window import require_window
 
 LANES = 64
 """Rows of pixels are made up to a multiple of this, which is as many 8-bit numbers as a vector instruction takes."""

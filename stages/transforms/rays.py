@@ -1,6 +1,6 @@
 """The rays of the companion transform. Light: it does not load numba."""
 
-from stages.stage import StageError
+from semidense.stages.stage import StageError
 
 LINES = {
     4: ((0, 1), (1, 0)),

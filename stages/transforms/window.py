@@ -1,6 +1,6 @@
 """The square window of a transform."""
 
-from stages.stage import StageError
+from semidense.stages.stage import StageError
 
 
 def require_window(window: int) -> int:

@@ -17,11 +17,11 @@ from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 from torch import nn
 
-from stages.evaluation.net import EvaluationNet
-from stages.matching.descriptor_net import DescriptorNet
-from stages.matching.net import HEADS, MatchingNet
-from stages.parameters import count, from_vector, to_vector
-from stages.stage import Arrays, StageError
+from semidense.stages.evaluation.net import EvaluationNet
+from semidense.stages.learning.parameters import count, from_vector, to_vector
+from semidense.stages.matching.descriptors.net import DescriptorNet
+from semidense.stages.matching.net import HEADS, MatchingNet
+from semidense.stages.stage import Arrays, StageError
 
 LOSS = "loss"
 """The tensor of a file that is no part of the network: float32 (step,)."""

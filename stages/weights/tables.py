@@ -9,8 +9,8 @@ from safetensors import SafetensorError
 from safetensors.numpy import load as load_arrays
 from safetensors.numpy import save as save_arrays
 
-from stages.evaluation.calibration_declaration import BINS, CALIBRATION, MAPS
-from stages.stage import Array, Arrays, StageError
+from semidense.stages.evaluation.calibration.declaration import BINS, CALIBRATION, MAPS
+from semidense.stages.stage import Array, Arrays, StageError
 
 LARGEST = 2**22
 """Bytes; a larger file is refused before it is parsed."""

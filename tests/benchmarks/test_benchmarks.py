@@ -24,11 +24,11 @@ from benchmarks import (
     workers,
 )
 from benchmarks.harness import Ratio, compare
-from datasets import open_dataset
-from pipeline.api import Result, Task, run
-from pipeline.errors import UsageError
-from stages.matching.net import MatchingNet
-from stages.metrics import auc
+from semidense.datasets import open_dataset
+from semidense.pipeline.api import Result, Task, run
+from semidense.pipeline.plan.errors import UsageError
+from semidense.stages.matching.net import MatchingNet
+from semidense.stages.metrics import auc
 from tests.tiny import SETTINGS, SPEC
 
 TINY = "synthetic:train=0,test=1,height=48,width=64,disparities=4"

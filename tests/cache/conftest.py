@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cache import Draft, Entry, Recipe, Store
+from semidense.cache import Draft, Entry, Recipe, Store
 
 PROJECT = Path(__file__).parents[2]
 VALUES = np.array([[0, 1, np.nan], [3, 4, 5], [0, 0, 0]], dtype=np.float32)
@@ -27,8 +27,8 @@ PRELUDE = f"""
 import os, signal, sys
 from pathlib import Path
 import numpy as np
-from cache import Recipe, Store
-from cache import draft as drafting, publish, quarantine
+from semidense.cache import Recipe, Store
+from semidense.cache.entries import draft as drafting, publish, quarantine
 recipe = Recipe(**{RECIPE.to_dict()!r})
 values = np.array([[0, 1, np.nan], [3, 4, 5], [0, 0, 0]], dtype=np.float32)
 

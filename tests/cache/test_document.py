@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cache.document import canonical, digest, parse, seal, unseal
-from cache.errors import InvalidRecipe
+from semidense.cache.document import canonical, digest, parse, seal, unseal
+from semidense.cache.errors import InvalidRecipe
 
 scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text()
 trees = st.recursive(

@@ -1,6 +1,6 @@
 import pytest
 
-from cache import errors
+from semidense.cache import errors
 
 
 @pytest.mark.parametrize(

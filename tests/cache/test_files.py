@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from cache.errors import CacheUnavailable, DamagedEntry
-from cache.files import in_threads, make_folder, remove, walk, write_synced, writing
+from semidense.cache.errors import CacheUnavailable, DamagedEntry
+from semidense.cache.files import in_threads, make_folder, remove, walk, write_synced, writing
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_threads_keep_order_and_pass_errors_on() -> None:
 
 def test_importing_the_cache_is_light() -> None:
     heavy = "{'numpy', 'zarr', 'xarray', 'dask', 'pandas', 'numcodecs'}"
-    code = f"import sys, cache, cache.verify; print(sorted({heavy} & set(sys.modules)))"
+    code = f"import sys, cache, semidense.cache.upkeep.verify; print(sorted({heavy} & set(sys.modules)))"
     project = Path(__file__).parents[2]
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=project, check=True)
     assert done.stdout.strip() == "[]"

@@ -2,7 +2,7 @@ import os
 import subprocess
 import sys
 
-from cache.owner import is_abandoned, owner
+from semidense.cache.owner import is_abandoned, owner
 
 
 def test_own_things_are_not_abandoned() -> None:

@@ -7,9 +7,18 @@ import dask
 import numpy as np
 import pytest
 
-from cache import CacheUnavailable, DamagedEntry, Entry, EntryNotFound, InvalidKey, InvalidRecipe, Recipe, Store
-from cache.check import Policy
-from cache.files import walk
+from semidense.cache import (
+    CacheUnavailable,
+    DamagedEntry,
+    Entry,
+    EntryNotFound,
+    InvalidKey,
+    InvalidRecipe,
+    Recipe,
+    Store,
+)
+from semidense.cache.entries.check import Policy
+from semidense.cache.files import walk
 
 
 def test_an_empty_cache_answers_and_makes_nothing(store: Store, recipe: Recipe) -> None:
@@ -193,7 +202,7 @@ def test_as_an_ordinary_user_a_read_only_cache_reads_and_is_explained(
     store.root.chmod(0o555)
     printed = run_script(
         """
-from cache import CacheError
+from semidense.cache import CacheError
 store = Store(sys.argv[1])
 print("root still" if os.access(sys.argv[1], os.W_OK) else "ordinary")
 print(store.open(recipe.key)["map"].values[1, 1])
@@ -229,7 +238,7 @@ except OSError as error:
     print(error)
 print(make(root / "cache").digest == first.digest, store.check(first.key))
 print(len(list(store.layout.quarantine.iterdir())), len(list(store.layout.drafts.iterdir())))
-from cache.files import remove
+from semidense.cache.files import remove
 remove(root / "cache")
 print((root / "cache").exists())
 """,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from datasets.formats.pfm import write_pfm
-from datasets.scene import Scene
+from semidense.datasets.formats.pfm import write_pfm
+from semidense.datasets.scene import Scene
 
 _CALIB = (
     "cam0=[100 0 4; 0 100 3; 0 0 1]\ncam1=[100 0 5; 0 100 3; 0 0 1]\ndoffs=1\nbaseline=50\nwidth=8\nheight=6\nndisp=4\n"

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from datasets.occlusion import left_right_check, warped_truth_mask
+from semidense.datasets.occlusion import left_right_check, warped_truth_mask
 
 NAN = np.nan
 YES, NO = True, False

@@ -3,7 +3,7 @@ import sys
 
 import pytest
 
-import datasets
+from semidense import datasets
 
 HEAVY = {"skimage", "torch", "matplotlib", "scipy", "imageio"}
 
@@ -11,12 +11,18 @@ HEAVY = {"skimage", "torch", "matplotlib", "scipy", "imageio"}
 @pytest.mark.parametrize(
     "code, absent",
     [
-        pytest.param("import datasets", HEAVY | {"numpy", "PIL"}, id="the package alone"),
-        pytest.param("import datasets; datasets.DatasetError", HEAVY | {"numpy", "PIL"}, id="the errors"),
-        pytest.param("import datasets; datasets.describe()", HEAVY | {"PIL"}, id="listing the specifications"),
-        pytest.param("import datasets; datasets.open_dataset('motorcycle').scenes[0]", HEAVY, id="a scene, listed"),
+        pytest.param("from semidense import datasets", HEAVY | {"numpy", "PIL"}, id="the package alone"),
         pytest.param(
-            "import datasets; datasets.open_dataset('motorcycle').scenes[0].load()",
+            "from semidense import datasets; datasets.DatasetError", HEAVY | {"numpy", "PIL"}, id="the errors"
+        ),
+        pytest.param(
+            "from semidense import datasets; datasets.describe()", HEAVY | {"PIL"}, id="listing the specifications"
+        ),
+        pytest.param(
+            "from semidense import datasets; datasets.open_dataset('motorcycle').scenes[0]", HEAVY, id="a scene, listed"
+        ),
+        pytest.param(
+            "from semidense import datasets; datasets.open_dataset('motorcycle').scenes[0].load()",
             HEAVY - {"imageio"},
             id="a scene, its images decoded",
         ),

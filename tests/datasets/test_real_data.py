@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datasets.occlusion import warped_truth_mask
-from datasets.registry import Dataset, open_dataset
+from semidense.datasets.occlusion import warped_truth_mask
+from semidense.datasets.registry import Dataset, open_dataset
 
 PATHS = {"middlebury": "middlebury", "kitti2015": "kitti2015", "eth3d": "eth3d"}
 WRONG_SCALES = (-1, 0, 0.25, 0.5, 0.9, 1.1, 2, 4)

@@ -2,9 +2,9 @@ from pathlib import Path
 
 import pytest
 
-from datasets.errors import DatasetError, SceneNotFound, UnknownDatasetError
-from datasets.registry import Dataset, describe, open_dataset
-from datasets.scene import DisparityRange, SceneSource
+from semidense.datasets.errors import DatasetError, SceneNotFound, UnknownDatasetError
+from semidense.datasets.registry import Dataset, describe, open_dataset
+from semidense.datasets.scene import DisparityRange, SceneSource
 
 
 def source(name: str) -> SceneSource:

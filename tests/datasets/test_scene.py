@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datasets.errors import DatasetError, MissingFileError
-from datasets.formats.png16 import write_png16
-from datasets.scene import Calibration, DisparityRange, Scene, SceneSource, Truth
+from semidense.datasets.errors import DatasetError, MissingFileError
+from semidense.datasets.formats.png16 import write_png16
+from semidense.datasets.scene import Calibration, DisparityRange, Scene, SceneSource, Truth
 
 GRAY = np.zeros((2, 3), np.uint8)
 RANGE = DisparityRange(0, 3)
@@ -113,7 +113,7 @@ def source(tmp_path: Path, save_image: Callable[..., Path]) -> SceneSource:
         split="test",
         size=(6, 8),
         disparities=RANGE,
-        reader="datasets.kitti",
+        reader="semidense.datasets.benchmarks.kitti",
         files={**files, "truth": tmp_path / "truth.png"},
         parameters={"scale": 4},
         has_truth=True,
@@ -141,7 +141,7 @@ def test_identity_names_content_not_places(source: SceneSource, tmp_path: Path) 
     before = source.identity()
     assert json.loads(json.dumps(before)) == before
     assert str(tmp_path) not in json.dumps(before)
-    assert before["reader"] == "datasets.kitti"
+    assert before["reader"] == "semidense.datasets.benchmarks.kitti"
     assert before["parameters"] == {"scale": 4}
     elsewhere = {role: path.rename(path.with_suffix(".moved")) for role, path in source.files.items()}
     assert replace(source, name="two", files=elsewhere).identity() == before

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
 
-from cache import Store
-from cache.document import seal, unseal
-from cache.files import walk, walk_folders
+from semidense.cache import Store
+from semidense.cache.document import seal, unseal
+from semidense.cache.files import walk, walk_folders
 
 Damage = Callable[[Path, Path], object]
 """Does something to an entry's folder and record."""

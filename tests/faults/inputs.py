@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from cache import Store
-from cache.archive import export_entries, import_entries
-from datasets.formats.calib import read_calib
-from datasets.formats.images import read_image
-from datasets.formats.pfm import read_pfm, write_pfm
-from datasets.formats.png16 import read_png16
-from pipeline.config import Config
-from pipeline.errors import USER_ERRORS
-from stages.transforms.channels import compute_channels
-from stages.transforms.declaration import ChannelsParams
+from semidense.cache import Store
+from semidense.cache.upkeep.archive import export_entries, import_entries
+from semidense.datasets.formats.calib import read_calib
+from semidense.datasets.formats.images import read_image
+from semidense.datasets.formats.pfm import read_pfm, write_pfm
+from semidense.datasets.formats.png16 import read_png16
+from semidense.pipeline.plan.config import Config
+from semidense.pipeline.plan.errors import USER_ERRORS
+from semidense.stages.transforms.channels import compute_channels
+from semidense.stages.transforms.declaration import ChannelsParams
 from tests.faults import world
 from tests.faults.tally import Tally
 
@@ -205,7 +205,7 @@ def bad_files(scale: float) -> Tally:
 
 
 def _read_weights(path: Path) -> object:
-    from stages.weights import read_weights
+    from semidense.stages.weights import read_weights
 
     return read_weights("matching_net", path.read_bytes())
 
@@ -355,7 +355,7 @@ def _gzipped(data: bytes) -> bytes:
 
 def _bombs(members: list[tuple[tarfile.TarInfo, bytes]], rebuilt: Callable[..., bytes]) -> Iterator[tuple[str, bytes]]:
     """Yield archives whose record, manifest and digests all agree, and whose arrays are not as written here."""
-    from cache.entry import Entry, File, Manifest
+    from semidense.cache.entries.entry import Entry, File, Manifest
 
     key = members[0][0].name.partition("/")[0]
     own = [(member.name[65:], data) for member, data in members if member.name.startswith(key)]

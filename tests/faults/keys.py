@@ -11,16 +11,16 @@ from typing import Any
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from cache.code import source_hash
-from datasets.scene import DisparityRange, SceneSource
-from pipeline.config import Config
-from pipeline.steps import PRODUCTS, Graph, Request, build
-from stages.catalog import STAGES
-from stages.precision import resolve
+from semidense.cache.keys.code import source_hash
+from semidense.datasets.scene import DisparityRange, SceneSource
+from semidense.pipeline.plan.config import Config
+from semidense.pipeline.plan.steps import PRODUCTS, Graph, Request, build
+from semidense.stages.catalog import STAGES
+from semidense.stages.compute.precision import resolve
 from tests.faults.tally import Tally
 
 PROJECT = Path(__file__).parents[2]
-PACKAGES = ("pipeline", "stages", "datasets", "cache")
+FOLDERS = ("pipeline", "stages", "datasets", "cache")
 PER_MODULE, QUICK_PER_MODULE = 40, 12
 """Tokens and line ends of each module that are changed, and those of the quick form."""
 
@@ -46,7 +46,7 @@ def keys_of(graph: Graph) -> dict[str, str]:
 
 
 def _request(config: Config, train: bool) -> Request:
-    from datasets import open_dataset
+    from semidense.datasets import open_dataset
 
     dataset = open_dataset("synthetic:train=2,test=1,height=64,width=80,disparities=8")
     training = tuple(scene for scene in dataset.scenes if scene.split == "train") if train else ()
@@ -128,7 +128,9 @@ def _input_bytes(tally: Tally, stride: int) -> None:
         for file, length in (("left", 700), ("right", 700), ("truth", 400)):
             (folder / file).write_bytes(random.Random(file).randbytes(length))
         files = {file: folder / file for file in ("left", "right", "truth")}
-        scene = SceneSource("a", "b", "test", (20, 30), DisparityRange(0, 9), "datasets.readers", files, {}, True)
+        scene = SceneSource(
+            "a", "b", "test", (20, 30), DisparityRange(0, 9), "semidense.datasets.readers", files, {}, True
+        )
         pristine = scene.image_identity(), scene.truth_identity()
         for role, path in files.items():
             data = path.read_bytes()
@@ -152,8 +154,8 @@ def _input_bytes(tally: Tally, stride: int) -> None:
 def _sources(tally: Tally, most: int) -> None:
     """Change tokens of the packages' modules, and add comments and blank lines."""
     chance = random.Random(9)
-    for package in PACKAGES:
-        for path in sorted((PROJECT / package).rglob("*.py")):
+    for name in FOLDERS:
+        for path in sorted((PROJECT / name).rglob("*.py")):
             text = path.read_text()
             pristine = source_hash(text)
             for expected, edited, what in _chosen(list(_edits(text)), most, chance):

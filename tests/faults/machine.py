@@ -11,10 +11,10 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
 
-from cache import Store
-from cache.files import remove
-from cache.gc import Limits, collect, survey
-from cache.verify import verify
+from semidense.cache import Store
+from semidense.cache.files import remove
+from semidense.cache.upkeep.gc import Limits, collect, survey
+from semidense.cache.upkeep.verify import verify
 from tests.faults import world
 from tests.faults.damage import DAMAGE, SAME_SIZE, unlock
 from tests.faults.tally import Tally
@@ -143,7 +143,7 @@ def _played(examples: int, scale: float) -> list[tuple[int, list[str]]]:
 
 def _play(examples: int, scale: float) -> tuple[int, list[str]]:
     """Play so many examples; return how many faults they injected, and what went wrong."""
-    logging.getLogger("cache").setLevel(logging.ERROR)  # in a process of its own too
+    logging.getLogger("semidense.cache").setLevel(logging.ERROR)  # in a process of its own too
     TRUTH.__init__()  # type: ignore[misc]
     notes: list[str] = []
     try:

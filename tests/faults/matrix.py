@@ -48,12 +48,12 @@ HEADINGS = ("faults", "wrong results", "lost products", "leftovers", "tracebacks
 
 def run_row(row: Row, scale: float) -> dict[str, Any]:
     """Run a row and return its counts."""
-    logging.getLogger("cache").setLevel(logging.ERROR)  # what is set aside is expected here
+    logging.getLogger("semidense.cache").setLevel(logging.ERROR)  # what is set aside is expected here
     started = time.monotonic()
     try:
         tally = row.inject(scale)
     finally:
-        logging.getLogger("cache").setLevel(logging.NOTSET)
+        logging.getLogger("semidense.cache").setLevel(logging.NOTSET)
     about = {"row": row.number, "title": row.title, "seconds": round(time.monotonic() - started, 1)}
     return about | tally.to_dict()
 

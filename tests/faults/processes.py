@@ -8,9 +8,10 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from cache import Store, publish
-from pipeline.errors import StageFailed
-from stages.stage import Stage
+from semidense.cache import Store
+from semidense.cache.entries import publish
+from semidense.pipeline.plan.errors import StageFailed
+from semidense.stages.stage import Stage
 from tests.faults import world
 from tests.faults.tally import Tally
 from tests.pipeline import toy
@@ -65,7 +66,7 @@ def job_pipeline(root: Path, log: Path, number: int | None = None, step: int = 0
     world.quiet(log)
     import torch
 
-    from pipeline.cli import main
+    from semidense.pipeline.cli.main import main
 
     torch.set_num_threads(1)  # on a busy machine, threads of one product would mostly wait for one another
     seen: list[str] = []

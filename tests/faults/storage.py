@@ -5,7 +5,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from cache import Store
+from semidense.cache import Store
 from tests.faults import world
 from tests.faults.damage import DAMAGE, SAME_SIZE, Damage, files_of, flips, overwrite, unlock
 from tests.faults.tally import Tally
@@ -99,7 +99,7 @@ def _of_file(store: Store, key: str, name: str, change: object) -> Damage:
 
 
 def _start_afresh(root: Path, backup: Path) -> None:
-    from cache.files import remove
+    from semidense.cache.files import remove
 
     remove(root)
     shutil.copytree(backup, root, symlinks=True)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from cache import Store
+from semidense.cache import Store
 from tests.faults import world
 from tests.faults.__main__ import MARKS, QUOTES
 from tests.faults.damage import DAMAGE, SAME_SIZE, unlock

@@ -14,16 +14,17 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from cache import Store, publish
-from cache.gc import Limits, collect, survey
-from cache.verify import verify
-from pipeline.attempts import attempt
-from pipeline.errors import USER_ERRORS
-from pipeline.plan import Plan, plan_graph
-from pipeline.steps import Graph
-from pipeline.tasks import Made, Unwatched
-from stages.catalog import STAGES
-from stages.stage import Output, Stage
+from semidense.cache import Store
+from semidense.cache.entries import publish
+from semidense.cache.upkeep.gc import Limits, collect, survey
+from semidense.cache.upkeep.verify import verify
+from semidense.pipeline.execution.retry import attempt
+from semidense.pipeline.execution.watch import Unwatched
+from semidense.pipeline.plan.errors import USER_ERRORS
+from semidense.pipeline.plan.plan import Made, Plan, plan_graph
+from semidense.pipeline.plan.steps import Graph
+from semidense.stages.catalog import STAGES
+from semidense.stages.stage import Output, Stage
 from tests.faults.tally import Tally
 from tests.pipeline import toy
 from tests.tiny import PATH
@@ -41,9 +42,9 @@ PRELOADED = [
     "dask.delayed",
     "dask.threaded",
     "distributed",
-    "cache.reader",
-    "pipeline.cli",
-    "pipeline.api",
+    "semidense.cache.entries.reader",
+    "semidense.pipeline.cli.main",
+    "semidense.pipeline.api",
     "torch",
     *sorted({STAGES[product].compute.partition(":")[0] for product in PATH & set(STAGES)}),
 ]

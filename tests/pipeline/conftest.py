@@ -4,12 +4,12 @@ from typing import Any
 
 import pytest
 
-from cache import Store
-from pipeline import plan as planning
-from pipeline.execute import execute
-from pipeline.plan import Plan, make_plan
-from pipeline.steps import Graph
-from pipeline.tasks import Made, Unwatched
+from semidense.cache import Store
+from semidense.pipeline.execution.scheduler import execute
+from semidense.pipeline.execution.watch import Unwatched
+from semidense.pipeline.plan import plan as planning
+from semidense.pipeline.plan.plan import Made, Plan, make_plan
+from semidense.pipeline.plan.steps import Graph
 from tests.pipeline import toy
 
 

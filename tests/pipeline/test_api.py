@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline import api
-from pipeline.api import Result, Task, open_store, parse_thresholds
-from pipeline.errors import UsageError
-from pipeline.opening import open_product
+from semidense.pipeline import api
+from semidense.pipeline.api import Result, Task, open_store, parse_thresholds
+from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.results.opening import open_product
 
 MakePair = Callable[[Path], Path]
 
@@ -113,7 +113,7 @@ def test_an_opened_volume_has_names_coordinates_units_and_provenance(trained: Re
     assert costs.attrs["stage"] == "costvolume"
     assert costs.attrs["params"]["d_max"] == 8
     assert costs.attrs["inputs"]["matching_net"] == trained.find("matching_net").digest
-    assert "stages.matching.cost_volume" in costs.attrs["code"]
+    assert "semidense.stages.matching.cost_volume" in costs.attrs["code"]
     assert costs.attrs["extras"]["configuration"]["matching_net"]["steps"] == 2
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-import pipeline
+from semidense import pipeline
 
 
 @pytest.mark.parametrize("name", pipeline.__all__)
@@ -21,8 +21,14 @@ def test_another_name_is_none() -> None:
     ("module", "heavy"),
     [
         pytest.param("pipeline", ["numpy", "torch", "dask", "zarr", "xarray", "pydantic"], id="the package"),
-        pytest.param("pipeline.cli", ["numpy", "torch", "dask", "zarr", "xarray", "pydantic"], id="the command line"),
-        pytest.param("pipeline.api", ["torch", "dask", "zarr", "xarray", "numba", "matplotlib"], id="planning"),
+        pytest.param(
+            "semidense.pipeline.cli.main",
+            ["numpy", "torch", "dask", "zarr", "xarray", "pydantic"],
+            id="the command line",
+        ),
+        pytest.param(
+            "semidense.pipeline.api", ["torch", "dask", "zarr", "xarray", "numba", "matplotlib"], id="planning"
+        ),
     ],
 )
 def test_importing_it_stays_light(module: str, heavy: list[str], project: Path) -> None:

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.plan import Plan, Planned
-from pipeline.steps import Graph, Step
-from stages.stage import Arrays, Inputs, Output, Params, Stage, StageError
+from semidense.pipeline.plan.plan import Plan, Planned
+from semidense.pipeline.plan.steps import Graph, Step
+from semidense.stages.stage import Arrays, Inputs, Output, Params, Stage, StageError
 
 HEIGHT, WIDTH = 10, 4
 CALLS: list[str] = []

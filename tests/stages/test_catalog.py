@@ -4,9 +4,9 @@ import sys
 
 import pytest
 
-from stages.baselines.declaration import BASELINES
-from stages.catalog import CATALOG, STAGES
-from stages.stage import Stage
+from semidense.stages.baselines.declaration import BASELINES
+from semidense.stages.catalog import CATALOG, STAGES
+from semidense.stages.stage import Stage
 
 READ = {"images", "truth"}
 """Products that no stage makes."""
@@ -47,6 +47,8 @@ def test_the_outputs_are_declared_completely(stage: Stage) -> None:
 
 def test_declarations_load_neither_torch_nor_numba() -> None:
     """Planning and looking at the cache answer at once."""
-    script = "import sys, stages.catalog; sys.exit(', '.join({'torch', 'numba', 'scipy'} & set(sys.modules)) or 0)"
+    script = (
+        "import sys, semidense.stages.catalog; sys.exit(', '.join({'torch', 'numba', 'scipy'} & set(sys.modules)) or 0)"
+    )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr

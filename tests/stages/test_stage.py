@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from stages.stage import NoParams, Output, Params, Silent, Stage, StageError, by_scene, require_shape
+from semidense.stages.stage import NoParams, Output, Params, Silent, Stage, StageError, by_scene, require_shape
 
 OUTPUT = Output("total", ("y", "x"), "float32", "1", "a sum")
 STAGE = Stage("total", ("images",), (OUTPUT,), "json.decoder:JSONDecoder")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stages.stage import Border, Inputs, NoParams, Output, Stage
+from semidense.stages.stage import Border, Inputs, NoParams, Output, Stage
 from tests.stages.tiling import same, tiled, whole
 
 IMAGE = {"images": {"left": np.arange(35.0).reshape(7, 5) ** 2, "gain": np.array([2.0])}}

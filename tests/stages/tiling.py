@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.stage import Params, Stage
+from semidense.stages.stage import Params, Stage
 
 Array = NDArray[Any]
 Dims = Mapping[str, Mapping[str, Sequence[str]]]

@@ -75,7 +75,7 @@ def look(browser: Any) -> Iterator[Callable[..., Seen]]:  # noqa: ANN401
 @contextmanager
 def serving(cache: Path) -> Iterator[tuple[str, int]]:
     """Run ``pipeline view`` over a cache; give its address and process."""
-    code = "from pipeline.cli import main; main()"
+    code = "from semidense.pipeline.cli.main import main; main()"
     command = [sys.executable, "-c", code, "view", "--cache", str(cache), "--port", "0", "--no-show"]
     process = subprocess.Popen(command, cwd=PROJECT, stdout=subprocess.PIPE, text=True)
     try:

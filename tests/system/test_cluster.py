@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cache import Store
-from pipeline import api
-from pipeline.api import Result, Task
-from pipeline.errors import StageFailed, StageRefused
-from pipeline.execute import execute
-from pipeline.opening import open_product
-from pipeline.steps import Graph
-from pipeline.tasks import Made, Unwatched
+from semidense.cache import Store
+from semidense.pipeline import api
+from semidense.pipeline.api import Result, Task
+from semidense.pipeline.execution.scheduler import execute
+from semidense.pipeline.execution.watch import Unwatched
+from semidense.pipeline.plan.errors import StageFailed, StageRefused
+from semidense.pipeline.plan.plan import Made
+from semidense.pipeline.plan.steps import Graph
+from semidense.pipeline.results.opening import open_product
 from tests.pipeline.toy import BLURRED, chain
 from tests.tiny import TRAINED
 
@@ -58,7 +59,7 @@ def test_the_command_line_finds_the_scheduler(scheduler: str, invoke: Callable[.
 
 
 def run(graph: Graph, store: Store, scheduler: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, Made]:
-    from pipeline import plan as planning
+    from semidense.pipeline.plan import plan as planning
 
     monkeypatch.setattr(planning, "build", lambda _: graph)
     request: Any = None

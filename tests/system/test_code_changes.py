@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from pipeline.api import Result
+from semidense.pipeline.api import Result
 from tests.tiny import PATH, TRAINED
 
 ALL = PATH
@@ -17,10 +17,10 @@ BELOW_CHANNELS = ALL - {"images", "truth", "matching_samples"}
 
 @pytest.fixture(scope="module")
 def sources(project: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the packages, to edit."""
+    """A folder to import from, with a copy of the packages to edit."""
     folder = tmp_path_factory.mktemp("sources")
     for package in ("pipeline", "stages", "datasets", "cache"):
-        shutil.copytree(project / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(project / package, folder / "semidense" / package, ignore=shutil.ignore_patterns("__pycache__"))
     return folder
 
 
@@ -43,18 +43,22 @@ def replace(text: str, old: str, new: str) -> str:
             "stages/transforms/rank.py",
             lambda text: text + "\n\nUNUSED = 1\n",
             BELOW_CHANNELS,
-            {"code.stages.transforms.rank"},
+            {"code.semidense.stages.transforms.rank"},
             id="code of a helper",
         ),
         pytest.param(
-            "stages/filtering.py",
+            "stages/evaluation/filtering.py",
             lambda text: replace(text, "confidence >= confidence.dtype", "confidence > confidence.dtype"),
             {"semidense", "metrics"},
-            {"code.stages.filtering"},
+            {"code.semidense.stages.evaluation.filtering"},
             id="code of a stage",
         ),
         pytest.param(
-            "pipeline/console.py", lambda text: text + "\n\nUNUSED = 1\n", set(), set(), id="code that makes no product"
+            "pipeline/cli/console.py",
+            lambda text: text + "\n\nUNUSED = 1\n",
+            set(),
+            set(),
+            id="code that makes no product",
         ),
     ],
 )
@@ -67,7 +71,7 @@ def test_an_edit_of_the_sources(
     stale: set[str],
     named: set[str],
 ) -> None:
-    path = sources / file
+    path = sources / "semidense" / file
     original = path.read_text()
     try:
         path.write_text(edit(original))

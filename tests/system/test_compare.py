@@ -9,18 +9,19 @@ from typing import Any
 
 import pytest
 
-from datasets import open_dataset
-from pipeline import compare
-from pipeline.ablation import ABLATION
-from pipeline.api import Task
-from pipeline.comparison import EXPERIMENTS, LOWERED, MATCHERS, MEASURES, Comparison
-from pipeline.comparison_report import COLUMNS, print_comparison, write_comparison
-from pipeline.environment import missing_packages
-from pipeline.errors import UsageError
-from pipeline.protocols import protocol_requests
-from pipeline.quoted import NAMED, QUOTED
-from pipeline.reporting import report
-from stages.catalog import STAGES
+from semidense.datasets import open_dataset
+from semidense.pipeline import compare
+from semidense.pipeline.api import Task
+from semidense.pipeline.comparison.ablation import ABLATION
+from semidense.pipeline.comparison.experiments import EXPERIMENTS, LOWERED, MATCHERS, MEASURES, Comparison
+from semidense.pipeline.comparison.files import COLUMNS, write_comparison
+from semidense.pipeline.comparison.paper_figures import NAMED, QUOTED
+from semidense.pipeline.comparison.protocols import protocol_requests
+from semidense.pipeline.comparison.tables import print_comparison
+from semidense.pipeline.pages.report import report
+from semidense.pipeline.plan.environment import missing_packages
+from semidense.pipeline.plan.errors import UsageError
+from semidense.stages.catalog import STAGES
 from tests.tiny import SETTINGS, SPEC, TEST_ONLY
 
 QUICK = (*SETTINGS, "o1_forest.samples=500", "ccnn_net.steps=2", "ccnn_net.batch=2", "ccnn_net.crop=16")
@@ -136,7 +137,8 @@ def test_what_needs_training_says_so_without_a_training_set(found: Comparison, t
 
 
 def test_without_a_package_its_rows_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    from pipeline import comparison, environment
+    from semidense.pipeline.comparison import experiments as comparison
+    from semidense.pipeline.plan import environment
 
     monkeypatch.setattr(environment, "_installed", lambda _: False)
     products, unavailable = comparison._available(EXPERIMENTS, True, ())
@@ -217,8 +219,8 @@ def test_a_mistake_is_one_line_and_writes_nothing(
 
 
 def test_a_single_baseline_without_its_package_is_refused(monkeypatch: pytest.MonkeyPatch, task: Task) -> None:
-    from pipeline import environment
-    from pipeline.api import status
+    from semidense.pipeline.api import status
+    from semidense.pipeline.plan import environment
 
     monkeypatch.setattr(environment, "_installed", lambda _: False)
     with pytest.raises(UsageError, match=r"sgm needs opencv-python-headless: pip install"):

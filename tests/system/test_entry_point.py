@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from pipeline.api import Result
+from semidense.pipeline.api import Result
 from tests.tiny import TRAINED
 
 Command = Callable[..., Any]
@@ -30,7 +30,7 @@ def test_help_answers_at_once(command: Command, arguments: list[str]) -> None:
 
 def test_help_loads_nothing_heavy(project: Path) -> None:
     code = (
-        "import sys\nfrom pipeline.cli import app\n"
+        "import sys\nfrom semidense.pipeline.cli.main import app\n"
         "try:\n    app(['run', '--help'])\nexcept SystemExit:\n    pass\n"
         "heavy = {'numpy', 'torch', 'dask', 'zarr', 'xarray', 'numba', 'matplotlib', 'skimage'}\n"
         "print('loaded', sorted(heavy & set(sys.modules)))"
@@ -79,7 +79,7 @@ def test_a_reader_that_has_seen_enough_is_no_fault(start: Callable[..., Any], tr
 
 def test_a_plan_that_is_all_hits_loads_no_network(trained: Result, project: Path) -> None:
     code = (
-        "import sys\nfrom pipeline.cli import app\n"
+        "import sys\nfrom semidense.pipeline.cli.main import app\n"
         "try:\n    app(sys.argv[1:])\nexcept SystemExit:\n    pass\n"
         "print('loaded', sorted({'torch', 'numba', 'dask', 'matplotlib'} & set(sys.modules)))"
     )

@@ -167,8 +167,8 @@ def with_tag() -> Image.Exif:
 def test_pictures_of_every_kind_are_taken_beside_plain_ones(
     pair: Path, name: str, store: Callable[[Image.Image, Path], None]
 ) -> None:
-    from datasets import open_dataset
-    from stages.transforms.gray import to_gray
+    from semidense.datasets import open_dataset
+    from semidense.stages.transforms.gray import to_gray
 
     store(Image.open(pair / "im0.png"), pair / name)
     (scene,) = open_dataset(f"pair:{pair}/{name},{pair}/im1.png").scenes

@@ -108,7 +108,7 @@ if os.getuid() == 0 and sys.argv[-1] != "again":
     os.execv(sys.executable, [*sys.orig_argv, "again"])
 if sys.argv[-1] == "again":
     sys.argv.pop()
-from pipeline.cli import main
+from semidense.pipeline.cli.main import main
 main()
 """
 
@@ -157,16 +157,18 @@ def test_a_command_line_that_is_none_exits_with_2_and_writes_to_stderr(invoke: I
 
 def test_a_fault_of_the_program_is_a_traceback_and_exit_code_1(tmp_path: Path, project: Path) -> None:
     code = (
-        "import sys; from pipeline import sources, cli\n"
+        "import sys\n"
+        "from semidense.pipeline.cli import main\n"
+        "from semidense.pipeline.plan import images_and_truth\n"
         "def broken(*_): raise RuntimeError('bang')\n"
-        "sources.read_images = broken\n"
+        "images_and_truth.read_images = broken\n"
         f"sys.argv = ['pipeline', 'run', {TEST_ONLY!r}, '--upto', 'images', '--cache', {str(tmp_path / 'cache')!r}]\n"
-        "cli.main()"
+        "main.main()"
     )
     ran = subprocess.run(
         [sys.executable, "-c", code], cwd=project, capture_output=True, text=True, timeout=60, check=False
     )
     assert (ran.returncode, ran.stdout) == (1, "")
-    assert ran.stderr.splitlines()[-1] == "pipeline.errors.StageFailed: images of test-0: bang"
+    assert ran.stderr.splitlines()[-1] == "semidense.pipeline.plan.errors.StageFailed: images of test-0: bang"
     assert "RuntimeError: bang" in ran.stderr, "the cause is told"
     assert list((tmp_path / "cache" / "drafts").iterdir()) == []

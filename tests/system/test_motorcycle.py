@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from datasets import open_dataset
-from datasets.formats.pfm import write_pfm
-from pipeline import api
-from pipeline.api import Task
+from semidense.datasets import open_dataset
+from semidense.datasets.formats.pfm import write_pfm
+from semidense.pipeline import api
+from semidense.pipeline.api import Task
 
 SHIPPED = all(
-    (resources.files("stages") / "weights" / f"{product}.safetensors").is_file()
+    (resources.files("semidense.stages") / "weights" / f"{product}.safetensors").is_file()
     for product in ("matching_net", "evaluation_net")
 )
 BAND = slice(200, 264)

@@ -9,7 +9,7 @@ import pytest
 import typer
 import typer.main
 
-from pipeline.cli import app
+from semidense.pipeline.cli.main import app
 
 README = Path(__file__).parents[2] / "README.md"
 BLOCKS = re.findall(r"^```\w*\n(.*?)^```", README.read_text(), re.DOTALL | re.MULTILINE) if README.is_file() else []
@@ -47,8 +47,8 @@ def test_a_command_that_is_none_does_not_parse(line: str) -> None:
 
 @pytest.mark.parametrize("line", COMMANDS)
 def test_the_settings_and_thresholds_of_the_readme_are_valid(line: str) -> None:
-    from pipeline.api import _alternatives, parse_thresholds
-    from pipeline.config import Config
+    from semidense.pipeline.api import _alternatives, parse_thresholds
+    from semidense.pipeline.plan.config import Config
 
     arguments = shlex.split(line, comments=True)
     given = list(pairwise(arguments))

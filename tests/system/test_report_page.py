@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.api import Task, sweep
-from pipeline.reporting import report
+from semidense.pipeline.api import Task, sweep
+from semidense.pipeline.pages.report import report
 from tests.system.conftest import NARROW, SCREENS, WIDE, Seen
 
 

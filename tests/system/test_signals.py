@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.api import Task, run, status
-from pipeline.steps import Step
-from pipeline.tasks import Unwatched
+from semidense.pipeline.api import Task, run, status
+from semidense.pipeline.execution.watch import Unwatched
+from semidense.pipeline.plan.steps import Step
 from tests.tiny import SETTINGS, SPEC, options
 
 Start = Callable[..., "subprocess.Popen[str]"]

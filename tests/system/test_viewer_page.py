@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stages.filtering import keep_confident
-from stages.metrics import avgerr, bad, invalid, rms
+from semidense.stages.evaluation.filtering import keep_confident
+from semidense.stages.metrics import avgerr, bad, invalid, rms
 from tests.handmade import Handmade, handmade, judge
 from tests.system.conftest import NARROW, WIDE, Seen, serving
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import zarr
 
-from pipeline import api
-from pipeline.api import Result, Task
-from pipeline.execute import totals
-from stages.catalog import STAGES
+from semidense.pipeline import api
+from semidense.pipeline.api import Result, Task
+from semidense.pipeline.execution.scheduler import totals
+from semidense.stages.catalog import STAGES
 from tests.tiny import PATH
 
 Invoke = Callable[..., Any]
@@ -134,7 +134,7 @@ def test_one_row_a_tile_or_all_at_once_is_the_same(
     Costs in float32, as far as float16 tells: where a tile of transformed cells begins follows the runner's tile, and
     with it the roundings, which in bfloat16 are larger.
     """
-    from pipeline import steps
+    from semidense.pipeline.plan import steps
 
     scene = "synthetic:train=0,test=1,height=64,width=80,disparities=8"
     task = Task(scene, settings=("costvolume.precision=float32",), cache=tmp_path / "usual")

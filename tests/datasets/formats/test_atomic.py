@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from datasets.formats.atomic import atomic_write
+from semidense.datasets.formats.atomic import atomic_write
 
 
 def test_replaces_when_the_block_ends_well(tmp_path: Path) -> None:

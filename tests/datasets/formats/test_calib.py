@@ -2,9 +2,9 @@ from pathlib import Path
 
 import pytest
 
-from datasets.errors import CalibrationError, MissingFileError
-from datasets.formats.calib import read_calib
-from datasets.scene import Calibration
+from semidense.datasets.errors import CalibrationError, MissingFileError
+from semidense.datasets.formats.calib import read_calib
+from semidense.datasets.scene import Calibration
 
 GOOD = {
     "cam0": "[994.978 0 311.193; 0 994.978 254.877; 0 0 1]",

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datasets import Calibration, CalibrationError, MissingFileError
-from datasets.formats.cameras import read_cameras
+from semidense.datasets import Calibration, CalibrationError, MissingFileError
+from semidense.datasets.formats.cameras import read_cameras
 
 EXPECTED = Calibration(500, 120, 30, (311, 250))
 P1 = np.array([[500.0, 0, 311, 0], [0, 500, 250, 0], [0, 0, 1, 0]])

@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 from PIL.ImageFile import ImageFile
 
-from datasets.errors import ImageError, MissingFileError
-from datasets.formats import images, limits
-from datasets.formats.images import image_size, read_image
+from semidense.datasets.errors import ImageError, MissingFileError
+from semidense.datasets.formats import images, limits
+from semidense.datasets.formats.images import image_size, read_image
 
 GRAY = np.arange(6, dtype=np.uint8).reshape(2, 3) * 40
 RGB = np.stack([GRAY, GRAY + 1, GRAY + 2], axis=2)

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from datasets.errors import DatasetError, MissingFileError, PfmError
-from datasets.formats.pfm import read_pfm, write_pfm
+from semidense.datasets.errors import DatasetError, MissingFileError, PfmError
+from semidense.datasets.formats.pfm import read_pfm, write_pfm
 
 SIX = np.array([[1, 2, 3], [4, 5, 6]], "<f4")
 BOTTOM_UP = SIX[::-1].tobytes()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from plyfile import PlyData
 
-from datasets import DatasetError
-from datasets.formats.ply import write_ply
+from semidense.datasets import DatasetError
+from semidense.datasets.formats.ply import write_ply
 
 
 @pytest.mark.parametrize("count", [0, 1, 5])

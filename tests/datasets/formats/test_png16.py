@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from PIL import Image
 
-from datasets.errors import DatasetError, ImageError, MissingFileError, Png16Error
-from datasets.formats.png16 import read_png16, write_png16
+from semidense.datasets.errors import DatasetError, ImageError, MissingFileError, Png16Error
+from semidense.datasets.formats.png16 import read_png16, write_png16
 
 
 def test_value_over_256_and_zero_is_none(tmp_path: Path) -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import tifffile
 
-from datasets import ImageError
-from datasets.formats.tiff import write_tiff
+from semidense.datasets import ImageError
+from semidense.datasets.formats.tiff import write_tiff
 
 VALUES = np.array([[0.1, np.nan, -7.25], [np.pi, 1e-30, 65504.123]], np.float32)
 

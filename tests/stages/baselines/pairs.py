@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.transforms.gray import gray_moments
+from semidense.stages.transforms.gray import gray_moments
 
 SHIFT = 3
 

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from stages.baselines.cost_confidence import EPSILON, cost_confidence
-from stages.baselines.declaration import COST_CONFIDENCE, CostConfidenceParams
-from stages.disparity import winner_take_all
-from stages.stage import StageError
+from semidense.stages.baselines.cost_confidence import EPSILON, cost_confidence
+from semidense.stages.baselines.declaration import COST_CONFIDENCE, CostConfidenceParams
+from semidense.stages.disparity.winner_takes_all import winner_take_all
+from semidense.stages.stage import StageError
 from tests.stages.tiling import same, tiled, whole
 
 NAN = np.nan

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from stages.baselines.declaration import (
+from semidense.stages.baselines.declaration import (
     BASELINES,
     CENSUS,
     MC_CNN,
@@ -18,8 +18,8 @@ from stages.baselines.declaration import (
     SgmParams,
     WindowParams,
 )
-from stages.stage import Stage, StageError
-from stages.transforms.gray import gray_moments
+from semidense.stages.stage import Stage, StageError
+from semidense.stages.transforms.gray import gray_moments
 from tests.stages.baselines.pairs import SHIFT, shifted_pair
 from tests.stages.tiling import same, tiled, whole
 

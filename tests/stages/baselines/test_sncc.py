@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from stages.baselines.sncc import correlation
+from semidense.stages.baselines.sncc import correlation
 
 
 @pytest.mark.parametrize(

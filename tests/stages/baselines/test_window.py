@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from stages.baselines.window import box_mean, keep_consistent
+from semidense.stages.baselines.window import box_mean, keep_consistent
 
 
 def test_a_window_is_cut_at_the_border() -> None:

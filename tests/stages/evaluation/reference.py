@@ -5,8 +5,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from stages.evaluation.net import EvaluationNet
-from stages.parameters import initialise
+from semidense.stages.evaluation.net import EvaluationNet
+from semidense.stages.learning.parameters import initialise
 
 
 def random_net(seed: int = 0) -> EvaluationNet:

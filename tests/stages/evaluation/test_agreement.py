@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from stages.evaluation.agreement import agreement
-from stages.stage import StageError
+from semidense.stages.evaluation.agreement import agreement
+from semidense.stages.stage import StageError
 
 N = np.nan
 

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from stages.evaluation.agreement import agreement
-from stages.evaluation.confidence import confidence, padded_log_odds, sigmoid, weigh_in
-from stages.evaluation.declaration import CONFIDENCE, ConfidenceParams
-from stages.evaluation.layers import evaluation_layers
-from stages.parameters import to_vector
-from stages.stage import StageError
+from semidense.stages.evaluation.agreement import agreement
+from semidense.stages.evaluation.confidence import confidence, padded_log_odds, sigmoid, weigh_in
+from semidense.stages.evaluation.declaration import CONFIDENCE, ConfidenceParams
+from semidense.stages.evaluation.layers import evaluation_layers
+from semidense.stages.learning.parameters import to_vector
+from semidense.stages.stage import StageError
 from tests.stages.evaluation.reference import literal_log_odds, random_layers, random_net, scene
 from tests.stages.tiling import tiled, whole
 

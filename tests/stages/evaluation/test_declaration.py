@@ -1,7 +1,7 @@
 import pytest
 from pydantic import ValidationError
 
-from stages.evaluation.declaration import (
+from semidense.stages.evaluation.declaration import (
     CONFIDENCE,
     PATCH,
     RADIUS,

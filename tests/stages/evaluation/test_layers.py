@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from stages.evaluation.layers import evaluation_layers
-from stages.stage import StageError
+from semidense.stages.evaluation.layers import evaluation_layers
+from semidense.stages.stage import StageError
 
 N = np.nan
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import torch
 
-from stages.evaluation.net import EvaluationNet, fragments, interleave
-from stages.parameters import count
+from semidense.stages.evaluation.net import EvaluationNet, fragments, interleave
+from semidense.stages.learning.parameters import count
 from tests.stages.evaluation.reference import literal_log_odds, literal_logits, random_layers, random_net
 
 

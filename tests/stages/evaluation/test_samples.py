@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from stages.evaluation.declaration import EVALUATION_SAMPLES, EvaluationSamplesParams
-from stages.evaluation.samples import UNKNOWN, draw_samples, label_pixels
-from stages.stage import StageError
+from semidense.stages.evaluation.declaration import EVALUATION_SAMPLES, EvaluationSamplesParams
+from semidense.stages.evaluation.samples import UNKNOWN, draw_samples, label_pixels
+from semidense.stages.stage import StageError
 from tests.stages.evaluation.reference import scene
 from tests.stages.tiling import same
 

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 import torch
 
-from stages.evaluation.confidence import confidence
-from stages.evaluation.declaration import EVALUATION_NET, EvaluationNetParams, EvaluationSamplesParams
-from stages.evaluation.layers import evaluation_layers
-from stages.evaluation.net import EvaluationNet
-from stages.evaluation.samples import draw_samples
-from stages.evaluation.train import cut_crop, train_evaluation_net, upright_logits
-from stages.parameters import from_vector
+from semidense.stages.evaluation.confidence import confidence
+from semidense.stages.evaluation.declaration import EVALUATION_NET, EvaluationNetParams, EvaluationSamplesParams
+from semidense.stages.evaluation.layers import evaluation_layers
+from semidense.stages.evaluation.net import EvaluationNet
+from semidense.stages.evaluation.samples import draw_samples
+from semidense.stages.evaluation.train import cut_crop, train_evaluation_net, upright_logits
+from semidense.stages.learning.parameters import from_vector
 from tests.stages.evaluation.reference import random_net, scene
 from tests.stages.monitors import InterruptedTrainingError, Memory
 

@@ -5,9 +5,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from stages.matching.declaration import RADIUS, Head
-from stages.matching.net import MatchingNet
-from stages.parameters import initialise
+from semidense.stages.learning.parameters import initialise
+from semidense.stages.matching.declaration import RADIUS, Head
+from semidense.stages.matching.net import MatchingNet
 
 NETS = [(channels, head) for head in ("compact", "paper") for channels in (1, 2, 3)]
 """Channels a view and head of every network."""

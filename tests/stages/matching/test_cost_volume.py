@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from stages.matching import cost_volume as module
-from stages.matching.cost_volume import cost_volume, padded_cost_volume, valid_columns
-from stages.matching.declaration import COST_VOLUME, CostVolumeParams, Head
-from stages.parameters import to_vector
-from stages.precision import Precision
-from stages.stage import StageError
+from semidense.stages.compute.precision import Precision
+from semidense.stages.learning.parameters import to_vector
+from semidense.stages.matching import cost_volume as module
+from semidense.stages.matching.cost_volume import cost_volume, padded_cost_volume, valid_columns
+from semidense.stages.matching.declaration import COST_VOLUME, CostVolumeParams, Head
+from semidense.stages.stage import StageError
 from tests.stages.matching.reference import literal_volume, random_net, shifted_scene
 from tests.stages.tiling import tiled, whole
 

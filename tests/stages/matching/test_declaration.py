@@ -1,7 +1,7 @@
 import pytest
 from pydantic import ValidationError
 
-from stages.matching.declaration import (
+from semidense.stages.matching.declaration import (
     COST_VOLUME,
     PATCH,
     RADIUS,
@@ -9,7 +9,7 @@ from stages.matching.declaration import (
     MatchingNetParams,
     MatchingSamplesParams,
 )
-from stages.stage import StageError
+from semidense.stages.stage import StageError
 
 
 def test_a_patch_has_a_centre() -> None:

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 import torch
 
-from stages.matching.declaration import Head
-from stages.matching.net import HEADS, MatchingNet, net_from_parameters
-from stages.parameters import count, to_vector
-from stages.precision import autocast
-from stages.stage import StageError
+from semidense.stages.compute.precision import autocast
+from semidense.stages.learning.parameters import count, to_vector
+from semidense.stages.matching.declaration import Head
+from semidense.stages.matching.net import HEADS, MatchingNet, net_from_parameters
+from semidense.stages.stage import StageError
 from tests.stages.matching.reference import NETS, literal_logits, patches, random_net
 
 every_net = pytest.mark.parametrize(("channels", "head"), NETS)

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from stages.matching.crops import IGNORED, cut_crop, label_cells
-from stages.matching.declaration import MATCHING_SAMPLES, MatchingSamplesParams
-from stages.matching.samples import ABSENT, draw_samples, visible_truth
-from stages.stage import StageError
+from semidense.stages.matching.crops import IGNORED, cut_crop, label_cells
+from semidense.stages.matching.declaration import MATCHING_SAMPLES, MatchingSamplesParams
+from semidense.stages.matching.samples import ABSENT, draw_samples, visible_truth
+from semidense.stages.stage import StageError
 from tests.stages.matching.reference import shifted_scene
 from tests.stages.tiling import same
 

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 import torch
 
-from stages.matching.cost_volume import cost_volume
-from stages.matching.crops import IGNORED, Crop, cut_crop, label_cells, ranking_loss
-from stages.matching.declaration import MATCHING_NET, MatchingNetParams, MatchingSamplesParams
-from stages.matching.net import net_from_parameters
-from stages.matching.samples import draw_samples
-from stages.matching.train import crops_loss, train_matching_net
+from semidense.stages.matching.cost_volume import cost_volume
+from semidense.stages.matching.crops import IGNORED, Crop, cut_crop, label_cells, ranking_loss
+from semidense.stages.matching.declaration import MATCHING_NET, MatchingNetParams, MatchingSamplesParams
+from semidense.stages.matching.net import net_from_parameters
+from semidense.stages.matching.samples import draw_samples
+from semidense.stages.matching.train import crops_loss, train_matching_net
 from tests.stages.matching.reference import literal_logits, patches, random_net, shifted_scene
 from tests.stages.monitors import InterruptedTrainingError, Memory
 

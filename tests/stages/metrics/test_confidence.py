@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stages.filtering import keep_confident
-from stages.metrics import auc, bad, error_at_density, error_curve, invalid, optimal_auc
-from stages.stage import StageError
+from semidense.stages.evaluation.filtering import keep_confident
+from semidense.stages.metrics import auc, bad, error_at_density, error_curve, invalid, optimal_auc
+from semidense.stages.stage import StageError
 
 N = np.nan
 pytestmark = pytest.mark.filterwarnings("error")

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from stages.metrics import avgerr, bad, error_quantiles, invalid, raw_bad, rms
-from stages.stage import StageError
+from semidense.stages.metrics import avgerr, bad, error_quantiles, invalid, raw_bad, rms
+from semidense.stages.stage import StageError
 
 N, I = np.nan, np.inf  # noqa: E741
 

@@ -3,8 +3,8 @@ import json
 import numpy as np
 import pytest
 
-from stages.filtering import keep_confident
-from stages.metrics import (
+from semidense.stages.evaluation.filtering import keep_confident
+from semidense.stages.metrics import (
     MASKS,
     METRICS,
     THRESHOLDS,
@@ -19,9 +19,9 @@ from stages.metrics import (
     rms,
     stage,
 )
-from stages.metrics.stage import FIGURES, by_name
-from stages.metrics.stage import compute_metrics as compute
-from stages.stage import NoParams, StageError
+from semidense.stages.metrics.stage import FIGURES, by_name
+from semidense.stages.metrics.stage import compute_metrics as compute
+from semidense.stages.stage import NoParams, StageError
 from tests.stages.tiling import same
 
 N = np.nan

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from stages.transforms.census import census_transform, hamming
+from semidense.stages.transforms.census import census_transform, hamming
 
 
 def test_a_bit_is_set_for_each_darker_neighbour() -> None:

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from stages.stage import StageError
-from stages.transforms.channels import channels
-from stages.transforms.companion import companion
-from stages.transforms.declaration import CHANNELS, ChannelsParams
-from stages.transforms.gray import gray_moments, to_gray
-from stages.transforms.rank import rank
+from semidense.stages.stage import StageError
+from semidense.stages.transforms.channels import channels
+from semidense.stages.transforms.companion import companion
+from semidense.stages.transforms.declaration import CHANNELS, ChannelsParams
+from semidense.stages.transforms.gray import gray_moments, to_gray
+from semidense.stages.transforms.rank import rank
 from tests.stages.tiling import same, tiled, whole
 
 DIMS = {"images": {"left": ("y", "x", "band"), "right": ("y", "x", "band"), "moments": ("view", "moment")}}

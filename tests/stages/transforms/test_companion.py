@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from stages.stage import StageError
-from stages.transforms.companion import companion
+from semidense.stages.stage import StageError
+from semidense.stages.transforms.companion import companion
 
 CROSS = [(0, 1), (0, -1), (1, 0), (-1, 0)]
 DIAGONAL = [(1, 1), (1, -1), (-1, 1), (-1, -1)]

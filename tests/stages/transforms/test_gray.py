@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from stages.stage import StageError
-from stages.transforms.gray import gray_moments, to_gray
+from semidense.stages.stage import StageError
+from semidense.stages.transforms.gray import gray_moments, to_gray
 
 
 @pytest.mark.parametrize(

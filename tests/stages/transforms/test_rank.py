@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from stages.stage import StageError
-from stages.transforms.rank import rank
+from semidense.stages.stage import StageError
+from semidense.stages.transforms.rank import rank
 
 
 def direct(gray: np.ndarray, window: int) -> np.ndarray:

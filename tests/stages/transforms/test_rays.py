@@ -1,7 +1,7 @@
 import pytest
 
-from stages.stage import StageError
-from stages.transforms.rays import LINES, require_rays
+from semidense.stages.stage import StageError
+from semidense.stages.transforms.rays import LINES, require_rays
 
 
 @pytest.mark.parametrize("rays", [4, 8, 16])

@@ -1,7 +1,7 @@
 import pytest
 
-from stages.stage import StageError
-from stages.transforms.window import require_window
+from semidense.stages.stage import StageError
+from semidense.stages.transforms.window import require_window
 
 
 @pytest.mark.parametrize("window", [3, 31, 61])

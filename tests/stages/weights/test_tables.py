@@ -7,10 +7,10 @@ import pytest
 from safetensors import safe_open
 from safetensors.numpy import save
 
-from stages.evaluation.calibration_declaration import BINS
-from stages.evaluation.calibration_table import EDGES
-from stages.stage import StageError
-from stages.weights.tables import LARGEST, read_table, save_table
+from semidense.stages.evaluation.calibration.declaration import BINS
+from semidense.stages.evaluation.calibration.table import EDGES
+from semidense.stages.stage import StageError
+from semidense.stages.weights.tables import LARGEST, read_table, save_table
 
 Arrays = dict[str, np.ndarray]
 

@@ -9,14 +9,14 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import load, save
 
-from stages import weights
-from stages.evaluation.net import EvaluationNet
-from stages.matching.declaration import Head
-from stages.matching.descriptor_net import DescriptorNet
-from stages.matching.net import MatchingNet
-from stages.parameters import count, to_vector
-from stages.stage import StageError
-from stages.weights import candidates, read_weights, save_weights
+from semidense.stages import weights
+from semidense.stages.evaluation.net import EvaluationNet
+from semidense.stages.learning.parameters import count, to_vector
+from semidense.stages.matching.declaration import Head
+from semidense.stages.matching.descriptors.net import DescriptorNet
+from semidense.stages.matching.net import MatchingNet
+from semidense.stages.stage import StageError
+from semidense.stages.weights import candidates, read_weights, save_weights
 from tests.stages.matching.reference import NETS, random_net
 
 VECTOR = to_vector(random_net())

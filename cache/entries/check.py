@@ -1,0 +1,173 @@
+"""Is an entry, to the byte, what was published? Looking changes nothing."""
+
+import errno
+import os
+import stat
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+from semidense.cache.entries.entry import MANIFEST, Entry, File, Manifest
+from semidense.cache.errors import DamagedEntry, EntryNotFound
+from semidense.cache.files import hash_file, in_threads, reading, walk
+from semidense.cache.layout import Layout
+
+Policy = Literal["full", "size", "off"]
+"""``full``: every byte. ``size``: which files there are, and their sizes. ``off``: record and manifest alone."""
+SETTLED = 0.1
+"""Seconds after which a file's times tell every later change; they advance in steps of up to 10 ms."""
+THREADS_PAY = 1 << 20
+"""Bytes from which on starting threads takes less time than they save."""
+
+_Print = tuple[int, int, int, int, int]
+_hashed: dict[str, tuple[_Print, str]] = {}
+"""Hashes known in this process: path -> (fingerprint at the time, sha256)."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a look at an entry found: record and manifest, both sound."""
+
+    entry: Entry
+    manifest: Manifest
+
+
+def read_record(layout: Layout, key: str) -> Entry:
+    """Return the entry that the record of ``key`` tells.
+
+    Raises:
+        EntryNotFound: if there is no record.
+        DamagedEntry: if the record is not what was written.
+        CacheUnavailable: if the file system refuses.
+    """
+    path = layout.record(key)
+    with reading(path):
+        try:
+            data = read_plain(path)
+        except FileNotFoundError:
+            raise EntryNotFound(f"no entry has the key {key} in {layout.root}") from None
+    return _entry(key, data)
+
+
+# A run reads the same documents several times; the same bytes need be parsed and compared but once.
+_entry = lru_cache(2048)(Entry.from_bytes)
+_manifest = lru_cache(2048)(Manifest.from_bytes)
+
+
+def read_plain(path: Path) -> bytes:
+    """Return a file's bytes; a link in its place is damage, wherever it leads."""
+    if not stat.S_ISREG(path.lstat().st_mode):
+        raise DamagedEntry(f"{path} is not a plain file")
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        if error.errno == errno.EIO:
+            raise DamagedEntry(f"{path} cannot be read from the disk") from error
+        raise
+
+
+def inspect(layout: Layout, key: str, policy: Policy, remember: bool = True) -> Finding:
+    """Compare an entry with its record and manifest, as far as the policy goes.
+
+    Args:
+        layout: of the cache.
+        key: of the entry.
+        policy: how much to read.
+        remember: whether a hash worked out earlier in this process counts for a file whose
+            size, times and inode are still the same.
+
+    Raises:
+        EntryNotFound: if there is no record.
+        DamagedEntry: naming the first thing that is wrong.
+        CacheUnavailable: if the file system refuses.
+    """
+    entry, folder = read_record(layout, key), layout.entry(key)
+    with reading(folder):
+        try:
+            manifest = _read_manifest(folder, entry)
+            if policy != "off":
+                _compare_files(folder, manifest, policy, remember)
+        except (FileNotFoundError, NotADirectoryError) as error:
+            raise DamagedEntry(f"the entry {key} is damaged: {error.filename} is missing") from None
+        except DamagedEntry as error:
+            raise DamagedEntry(f"the entry {key} is damaged: {error}") from None
+    return Finding(entry, manifest)
+
+
+def _read_manifest(folder: Path, entry: Entry) -> Manifest:
+    """Return the manifest if it is the one that the record tells."""
+    if not stat.S_ISDIR(folder.lstat().st_mode):
+        raise DamagedEntry(f"{folder} is not a folder")
+    manifest = _manifest(read_plain(folder / MANIFEST))
+    if (manifest.digest, manifest.size) != (entry.digest, entry.size):
+        raise DamagedEntry(f"its manifest has digest {manifest.digest}, its record {entry.digest}")
+    return manifest
+
+
+def _compare_files(folder: Path, manifest: Manifest, policy: Policy, remember: bool) -> None:
+    """Compare what is in the folder with the manifest: names, kinds, sizes, and the bytes if asked."""
+    there = dict(walk(folder))
+    expected = {MANIFEST, *manifest.folders, *(file.path for file in manifest.files)}
+    if differing := sorted(set(there) ^ expected):
+        raise DamagedEntry(f"{differing[0]} is {'missing' if differing[0] in expected else 'not in its manifest'}")
+    for path in manifest.folders:
+        if not there[path].is_dir(follow_symlinks=False):
+            raise DamagedEntry(f"{path} is not a folder")
+    for file in manifest.files:
+        _compare_size(file, there[file.path])
+    if policy == "full":
+        _compare_bytes(folder, manifest, remember)
+
+
+def _compare_size(file: File, thing: os.DirEntry[str]) -> None:
+    """Refuse a link, a special file, and a file of another size."""
+    if not thing.is_file(follow_symlinks=False):
+        raise DamagedEntry(f"{file.path} is a link, or no file at all")
+    if (size := thing.stat(follow_symlinks=False).st_size) != file.size:
+        raise DamagedEntry(f"{file.path} has {size} bytes, its manifest says {file.size}")
+
+
+def _compare_bytes(folder: Path, manifest: Manifest, remember: bool) -> None:
+    """Compare each file's hash with the manifest."""
+
+    def differs(file: File) -> bool:
+        return _hash(folder / file.path, remember) != file.sha256
+
+    unknown = [file for file in manifest.files if not (remember and _known(folder / file.path) == file.sha256)]
+    small = sum(file.size for file in unknown) < THREADS_PAY
+    for file, wrong in zip(unknown, map(differs, unknown) if small else in_threads(differs, unknown), strict=True):
+        if wrong:
+            raise DamagedEntry(f"the bytes of {file.path} are not those that were written")
+
+
+def forget() -> None:
+    """Forget all hashes of this process: every byte is read again."""
+    _hashed.clear()
+
+
+def _hash(path: Path, remember: bool) -> str | None:
+    """Return a file's sha256, and keep it if a later change of the file is sure to show; None if the disk fails."""
+    before, now = _fingerprint(path), time.time()
+    try:
+        sha256 = hash_file(path)
+    except OSError as error:
+        if error.errno == errno.EIO:
+            return None
+        raise
+    if remember and _fingerprint(path) == before and now - max(before[1], before[2]) / 1e9 > SETTLED:
+        _hashed[str(path)] = (before, sha256)
+    return sha256
+
+
+def _known(path: Path) -> str | None:
+    """Return the hash that was worked out earlier for this very file, unchanged since."""
+    known = _hashed.get(str(path))
+    return known[1] if known and known[0] == _fingerprint(path) else None
+
+
+def _fingerprint(path: Path) -> _Print:
+    """Return what changes with a file: size, both times, inode and device."""
+    status = path.lstat()
+    return status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino, status.st_dev

@@ -1,0 +1,168 @@
+"""How an entry comes to exist: data first, record last.
+
+1. every chunk is there, and nothing else;
+2. each file is hashed, synced and made read-only;
+3. the manifest is written, the folders are synced and made read-only;
+4. the draft is renamed to its place among the entries; nobody sees it yet;
+5. the record is written beside the drafts and linked to its name: now the entry exists.
+
+A kill at any point leaves a whole entry or nothing that anybody sees. A second writer of the same
+key compares digests and drops its own copy. The commit lock spares two writers from tripping over
+each other; should it fail, as on some network disks, the link still lets only one record win,
+and a record never fits another content.
+"""
+
+import os
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from semidense.cache.entries.check import inspect
+from semidense.cache.entries.entry import MANIFEST, Entry, File, Manifest
+from semidense.cache.entries.quarantine import move_anything, set_aside
+from semidense.cache.errors import DamagedEntry, EntryNotFound, NonDeterministicStage
+from semidense.cache.files import (
+    hash_file,
+    in_threads,
+    make_folder,
+    make_read_only,
+    move_folder,
+    remove,
+    sync,
+    walk,
+    walk_folders,
+    write_synced,
+)
+from semidense.cache.layout import Layout
+from semidense.cache.processes.locks import held
+
+STEPS = (
+    "begun",
+    "array created",
+    "chunk written",
+    "complete",
+    "hashed",
+    "manifest written",
+    "sealed",
+    "locked",
+    "cleared",
+    "renamed",
+    "entry synced",
+    "record written",
+    "record linked",
+    "published",
+)
+"""The steps of the protocol, in order; ``STEP_HOOK`` is told each when it is done."""
+
+STEP_HOOK: Callable[[str], None] = lambda _: None  # noqa: E731 - replaced by tests, to kill the process there
+
+
+def remove_strays(folder: Path, expected: Iterable[str]) -> None:
+    """Delete what a killed writer left in a draft, such as a half-written temporary file or an empty folder."""
+    wanted = set(expected)
+    for path, thing in list(walk(folder)):
+        if path not in wanted and not thing.is_dir(follow_symlinks=False):
+            remove(folder / path)
+    for each in walk_folders(folder):
+        with suppress(OSError):
+            each.rmdir()  # only of an empty folder does this succeed
+
+
+def seal(draft: Path, paths: Iterable[str]) -> Manifest:
+    """Hash and sync the draft's files, write their manifest, and make all of it read-only."""
+
+    def settle(path: str) -> File:
+        file = draft / path
+        make_read_only(file)
+        sync(file)
+        return File(path, file.stat().st_size, hash_file(file))
+
+    manifest = Manifest(tuple(in_threads(settle, sorted(paths))))
+    STEP_HOOK("hashed")
+    write_synced(draft / MANIFEST, manifest.to_bytes())
+    STEP_HOOK("manifest written")
+    for folder in walk_folders(draft):
+        sync(folder)
+        if folder != draft:  # that one is still to be renamed, which changes its ".."
+            make_read_only(folder)
+    STEP_HOOK("sealed")
+    return manifest
+
+
+def commit(layout: Layout, draft: Path, entry: Entry) -> Entry:
+    """Give a sealed draft its place and write its record; the draft is gone afterwards.
+
+    Returns:
+        The entry, or the one that another writer published first, if it is the same.
+
+    Raises:
+        NonDeterministicStage: if another writer published other content under this key.
+        CacheUnavailable, OSError: if the file system refuses.
+    """
+    with held(layout.lock("commit", entry.key)):
+        STEP_HOOK("locked")
+        published = _published(layout, draft, entry)
+        if published is None:
+            _place(layout, draft, entry)
+            published = _link_record(layout, draft, entry)
+    STEP_HOOK("published")
+    return published
+
+
+def _published(layout: Layout, draft: Path, entry: Entry) -> Entry | None:
+    """Return what another writer published under this key, if it is sound and the same."""
+    try:
+        found = inspect(layout, entry.key, "full")
+    except EntryNotFound:
+        return None
+    except DamagedEntry as error:
+        set_aside(layout, entry.key, str(error))
+        return None
+    _require_same(found.entry, entry)
+    remove(draft)
+    return found.entry
+
+
+def _require_same(old: Entry, new: Entry) -> None:
+    """Refuse a second result of the same recipe that differs from the first."""
+    if old.digest != new.digest:
+        raise NonDeterministicStage(
+            f"{new.recipe.stage} gave two results from one recipe (key {new.key}): {old.digest} on {old.created}, "
+            f"{new.digest} now; the first is kept: find what its key lacks, or what is random in it"
+        )
+
+
+def _place(layout: Layout, draft: Path, entry: Entry) -> None:
+    """Rename the draft to the entry's folder; data without a record, of a writer killed here, make way."""
+    target = layout.entry(entry.key)
+    make_folder(target.parent)
+    if os.path.lexists(target):
+        orphan = layout.new_draft()
+        move_anything(target, orphan)
+        remove(orphan)
+    STEP_HOOK("cleared")
+    move_folder(draft, target)
+    STEP_HOOK("renamed")
+    make_read_only(target)
+    sync(target)
+    sync(target.parent)
+    STEP_HOOK("entry synced")
+
+
+def _link_record(layout: Layout, draft: Path, entry: Entry) -> Entry:
+    """Write the record whole under another name, then link it: a link never replaces a record."""
+    temporary, record = draft.with_name(f"{draft.name}.json"), layout.record(entry.key)
+    make_folder(record.parent)
+    try:
+        write_synced(temporary, entry.to_bytes())
+        STEP_HOOK("record written")
+        record.hardlink_to(temporary)
+    except FileExistsError:
+        found = inspect(layout, entry.key, "full").entry
+        _require_same(found, entry)
+        return found
+    finally:
+        remove(temporary)
+    STEP_HOOK("record linked")
+    sync(record.parent)
+    return entry

@@ -1,0 +1,76 @@
+"""Read an entry's arrays through its manifest alone. Imports zarr: loaded when data are opened."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import zarr
+from zarr.storage import LocalStore
+
+from semidense.cache.entries.check import Finding
+from semidense.cache.entries.entry import DATA, Manifest
+from semidense.cache.errors import DamagedEntry
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from zarr.abc.store import ByteRequest
+    from zarr.core.buffer import Buffer, BufferPrototype
+
+
+class EntryStore(LocalStore):
+    """A zarr store that holds the files of one manifest, no more and no less.
+
+    To zarr a missing chunk is one full of fill values. Here it is an error: a file that the
+    manifest lists and that vanished or changed its size since the entry was opened.
+    """
+
+    def __init__(self, root: Path, manifest: Manifest) -> None:
+        super().__init__(root, read_only=True)
+        self.manifest = manifest
+        self._sizes = {file.path.removeprefix(f"{DATA}/"): file.size for file in manifest.files}
+
+    def with_read_only(self, read_only: bool = False) -> "EntryStore":
+        """Return this store again; it is never anything but read-only."""
+        if not read_only:
+            raise DamagedEntry(f"{self.root} is published: nothing can be written to it")
+        return type(self)(self.root, self.manifest)
+
+    async def get(
+        self, key: str, prototype: "BufferPrototype | None" = None, byte_range: "ByteRequest | None" = None
+    ) -> "Buffer | None":
+        """Return the bytes of a file of the manifest; None if the manifest lists none."""
+        if key not in self._sizes:
+            return None
+        return self._require(key, await super().get(key, prototype, byte_range), byte_range)
+
+    def get_sync(
+        self,
+        key: str,
+        *,
+        prototype: "BufferPrototype | None" = None,
+        byte_range: "ByteRequest | None" = None,
+    ) -> "Buffer | None":
+        """Return the bytes of a file of the manifest; None if the manifest lists none."""
+        if key not in self._sizes:
+            return None
+        return self._require(key, super().get_sync(key, prototype=prototype, byte_range=byte_range), byte_range)
+
+    def _require(self, key: str, data: "Buffer | None", byte_range: "ByteRequest | None") -> "Buffer":
+        """Refuse a file that is no longer the one that the manifest lists."""
+        if data is None or (byte_range is None and len(data) != self._sizes[key]):
+            raise DamagedEntry(f"{self.root / key} changed or vanished while its entry was open: open it again")
+        return data
+
+
+def open_group(folder: Path, found: Finding) -> zarr.Group:
+    """Return an entry's arrays as a zarr group that can only be read."""
+    store: Any = EntryStore(folder / DATA, found.manifest)
+    return zarr.open_group(store, mode="r", zarr_format=3, use_consolidated=False)
+
+
+def open_dataset(folder: Path, found: Finding) -> "xr.Dataset":
+    """Return an entry's arrays as a lazy dataset, values as stored, its provenance in ``attrs``."""
+    import xarray as xr
+
+    store: Any = EntryStore(folder / DATA, found.manifest)
+    dataset: xr.Dataset = xr.open_zarr(store, consolidated=False, chunks={}, decode_cf=False, zarr_format=3)
+    return dataset.assign_attrs(found.entry.provenance())

@@ -1,0 +1,200 @@
+"""Hash the source that a result depends on, so that a helper's change makes it stale and a comment does not.
+
+Followed are import statements anywhere in a file, relative ones too, ``import_module`` with a
+literal name, and the ``__init__`` of every parent package, which Python runs first. Not followed
+is a submodule that is only reached as an attribute and that another module imports.
+Modules are found and parsed, never imported.
+"""
+
+import ast
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec, resolve_name
+from pathlib import Path
+
+from semidense.cache.document import digest
+from semidense.cache.errors import SourceNotFound
+
+
+@dataclass(frozen=True)
+class _Module:
+    """Where a module is: its source file (None for a package without ``__init__``) and its package folders."""
+
+    name: str
+    file: Path | None
+    folders: tuple[Path, ...]
+
+    @property
+    def package(self) -> str:
+        """The package that relative imports start from."""
+        return self.name if self.folders else self.name.rpartition(".")[0]
+
+    def has_folder(self, name: str) -> bool:
+        """Return whether one of the package's folders holds a folder or a module of a name."""
+        return any((folder / name).is_dir() or (folder / f"{name}.py").is_file() for folder in self.folders)
+
+
+def code_hash(module: str, packages: tuple[str, ...]) -> str:
+    """Return one hash over ``code_parts``, in hexadecimal."""
+    return code_hash_of(code_parts(module, packages))
+
+
+def code_hash_of(parts: Mapping[str, str]) -> str:
+    """Return one hash over the modules of a recipe, as ``code_parts`` gave them."""
+    return digest(parts)
+
+
+def code_parts(module: str, packages: tuple[str, ...]) -> dict[str, str]:
+    """Return the hash of ``module`` and of all it imports from ``packages``, by module name.
+
+    A hash is over the file's syntax tree without comments, docstrings and positions. Files are
+    read once a process: what is already imported does not change either.
+
+    Args:
+        module: dotted name of the module that the result starts from.
+        packages: top-level packages that are followed; any other is the environment's business.
+
+    Raises:
+        SourceNotFound: if ``module`` has no Python source, or a file cannot be read or parsed.
+    """
+    return dict(_parts(module, packages))
+
+
+@cache
+def _parts(module: str, packages: tuple[str, ...]) -> Mapping[str, str]:
+    """Return what ``code_parts`` does, worked out once a process; nobody may change it."""
+    found: dict[str, str] = {}
+    waiting = [module]
+    if _locate(module) is None:
+        raise SourceNotFound(f"no Python source for the module {module!r}: is its package installed?")
+    while waiting:
+        name = waiting.pop()
+        if name not in found and (located := _locate(name)) and located.file:
+            found[name], imports, _ = _read(located)
+            followed = (each for each in (name, *imports) if each.partition(".")[0] in packages)
+            waiting += (part for each in followed for part in _parents(each))
+    return dict(sorted(found.items()))
+
+
+def source_text(module: str) -> str | None:
+    """Return the text that ``code_parts`` hashed for a module, None if it has none."""
+    located = _locate(module)
+    return _read(located)[2] if located and located.file else None
+
+
+def bare_tree(text: str | bytes) -> ast.AST:
+    """Return a source's syntax tree without docstrings, all that its hash is over.
+
+    Raises:
+        SyntaxError, ValueError: if it is no Python.
+    """
+    tree: ast.AST = _Bare().visit(ast.parse(text))
+    return tree
+
+
+def source_hash(text: str | bytes) -> str:
+    """Return the hash of a source: over its syntax tree without comments, docstrings and positions.
+
+    >>> source_hash("x = 1") == source_hash("x  =  1  # one")
+    True
+
+    Raises:
+        SyntaxError, ValueError: if it is no Python.
+    """
+    return hashlib.sha256(ast.dump(bare_tree(text)).encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _parents(module: str) -> Iterator[str]:
+    """Return the module and the packages that it is in: importing it runs them all."""
+    parts = module.split(".")
+    return (".".join(parts[: end + 1]) for end in range(len(parts)))
+
+
+@cache
+def _locate(module: str) -> _Module | None:
+    """Find a module without importing anything; None if there is none."""
+    parent, _, name = module.rpartition(".")
+    package = _locate(parent) if parent else None
+    if not parent or (package and package.file is None and not package.has_folder(name)):
+        return _locate_by_import_system(module)
+    for folder in package.folders if package else ():
+        if (file := folder / name / "__init__.py").is_file():
+            return _Module(module, file, (folder / name,))
+        if (file := folder / f"{name}.py").is_file():
+            return _Module(module, file, ())
+    folders = tuple(folder / name for folder in (package.folders if package else ()) if (folder / name).is_dir())
+    return _Module(module, None, folders) if folders else None
+
+
+def _locate_by_import_system(name: str) -> _Module | None:
+    """Find a top-level module, or a portion of a namespace package: an editable install has it elsewhere.
+
+    Looking for one imports nothing but the namespace package, which has no code.
+    """
+    try:
+        spec = find_spec(name)
+    except (ImportError, ValueError):
+        return None
+    if spec is None or spec.name != name:  # a running script is known by another name
+        return None
+    file = Path(spec.origin) if spec.has_location and spec.origin and spec.origin.endswith(".py") else None
+    folders = tuple(Path(folder) for folder in spec.submodule_search_locations or ())
+    return _Module(name, file, folders) if file or folders else None
+
+
+@cache
+def _read(module: _Module) -> tuple[str, frozenset[str], str]:
+    """Return the hash of a module's tree, the dotted names that it may import, and its text."""
+    try:
+        data = module.file.read_bytes() if module.file else b""
+        imports, hashed = frozenset(_imports(ast.parse(data), module)), source_hash(data)
+    except (OSError, SyntaxError, ValueError, RecursionError) as error:
+        raise SourceNotFound(f"cannot read the source {module.file}: {error}") from error
+    return hashed, imports, data.decode("utf-8", "replace")
+
+
+class _Bare(ast.NodeTransformer):
+    """Drop statements that are only text: docstrings, and the notes under an assignment."""
+
+    def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
+        """Drop the statement if it is a text, and look no deeper otherwise."""
+        return None if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str) else node
+
+
+def _imports(tree: ast.AST, module: _Module) -> Iterator[str]:
+    """Yield each dotted name that might be a module imported here; names that are none are harmless."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = _absolute("." * node.level + (node.module or ""), module)
+            yield base
+            for alias in node.names:
+                yield from _submodules(base) if alias.name == "*" else (f"{base}.{alias.name}",)
+        elif isinstance(node, ast.Call) and (name := _literal_import(node)):
+            yield _absolute(name, module)
+
+
+def _absolute(name: str, module: _Module) -> str:
+    """Resolve a relative name from the module's package."""
+    try:
+        return resolve_name(name, module.package)
+    except ImportError as error:
+        raise SourceNotFound(f"{module.file} imports {name!r}: {error}") from error
+
+
+def _literal_import(call: ast.Call) -> str | None:
+    """Return the name in ``import_module("name")`` or ``__import__("name")``."""
+    called = getattr(call.func, "attr", getattr(call.func, "id", None))
+    if called not in ("import_module", "__import__") or not call.args or not isinstance(call.args[0], ast.Constant):
+        return None
+    return call.args[0].value if isinstance(call.args[0].value, str) else None
+
+
+def _submodules(package: str) -> Iterator[str]:
+    """Yield every module directly in a package: a star import may bring in any of them."""
+    located = _locate(package)
+    for folder in located.folders if located else ():
+        yield from (f"{package}.{path.stem}" for path in sorted(folder.iterdir()) if path.stem.isidentifier())

@@ -1,0 +1,129 @@
+"""What running processes use: each keeps a list of keys, and nobody cleans away what is on a list.
+
+A lease is a file that its process holds locked, so it ends with the process, however that ends. Adding to a
+lease and cleaning exclude each other: an entry that is there after it was added stays there.
+"""
+
+import os
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from semidense.cache.errors import CacheUnavailable
+from semidense.cache.files import reading, remove, writing
+from semidense.cache.layout import Layout, is_key, require_key
+from semidense.cache.processes.locks import held, is_held, lock, try_lock
+
+_LINE = re.compile(r"^([0-9a-f]{64})\n", re.ASCII | re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Lease:
+    """The list of keys that a process uses; other processes that work for it can add to it.
+
+    Attributes:
+        root: the cache's folder.
+        path: the list; None in a cache that cannot be written: nothing is cleaned away there either.
+    """
+
+    root: Path
+    path: Path | None
+
+    def add(self, keys: Iterable[str]) -> None:
+        """Keep the entries of these keys, those that are yet to come too, and note that they are in use.
+
+        Raises:
+            InvalidKey: if one is not a key.
+            CacheUnavailable: if the file system refuses.
+        """
+        lines = "".join(f"{require_key(key)}\n" for key in keys)
+        layout = Layout(self.root)
+        if not lines or self.path is None:
+            return
+        with cleaning(layout), writing(self.path):
+            handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
+            try:
+                os.write(handle, lines.encode("ascii"))
+            finally:
+                os.close(handle)
+        for key in lines.split():
+            with suppress(OSError):
+                os.utime(layout.record(key))  # a record's time says when its entry was last used
+
+
+@contextmanager
+def leased(layout: Layout) -> Iterator[Lease]:
+    """Open a lease and end it with the block."""
+    path = layout.new_lease()
+    try:
+        layout.create()
+        with cleaning(layout):
+            mine = lock(path)
+    except CacheUnavailable:
+        yield Lease(layout.root, None)
+        return
+    try:
+        yield Lease(layout.root, path)
+    finally:
+        mine.release()
+
+
+@contextmanager
+def cleaning(layout: Layout) -> Iterator[None]:
+    """Hold what excludes adding to leases and cleaning."""
+    with held(layout.locks / "leases"):
+        yield
+
+
+def in_use(layout: Layout) -> frozenset[str]:
+    """Return the keys on the lists of running processes."""
+    found: set[str] = set()
+    with reading(layout.leases):
+        for path in layout.leases.iterdir() if layout.leases.is_dir() else ():
+            if is_held(path):
+                with suppress(FileNotFoundError):
+                    found.update(_LINE.findall(path.read_text(encoding="ascii", errors="replace")))
+    return frozenset(found)
+
+
+def sweep_locks(layout: Layout) -> None:
+    """Delete the files of locks and leases whose processes are gone.
+
+    Raises:
+        CacheUnavailable: if the file system refuses.
+    """
+    for folder in (layout.locks, layout.leases):
+        with reading(folder):
+            stale = [path for path in folder.iterdir() if not is_held(path)] if folder.is_dir() else []
+        for path in stale:
+            remove_stale(layout, path)
+
+
+def remove_stale(layout: Layout, path: Path) -> bool:
+    """Delete a lock's file if nobody holds it, while holding it: nobody then takes a lock that is deleted."""
+    if path.parent == layout.leases:
+        with cleaning(layout):  # a lease that is just being opened is not locked yet
+            return _remove_unheld(path)
+    return _remove_unheld(path)
+
+
+def _remove_unheld(path: Path) -> bool:
+    taken = try_lock(path) if path.exists() else None
+    if taken:
+        taken.release()
+    return taken is not None
+
+
+def sweep_checkpoints(layout: Layout) -> None:
+    """Delete the checkpoints of products that are there, unless somebody makes one again.
+
+    Raises:
+        CacheUnavailable: if the file system refuses.
+    """
+    with reading(layout.checkpoints):
+        names = [path.name for path in layout.checkpoints.iterdir()] if layout.checkpoints.is_dir() else []
+    for key in filter(is_key, names):
+        if layout.record(key).exists() and not is_held(layout.lock("making", key)):
+            remove(layout.checkpoint(key))

@@ -1,0 +1,251 @@
+"""Find what can be deleted and why, and delete it: never what a running process uses.
+
+``survey`` only looks. ``collect`` looks at each thing again, moves it out of sight by a rename, and then deletes it;
+killed in between, it leaves a draft of a dead process, which the next run sweeps.
+"""
+
+import json
+import os
+import time
+from collections.abc import Container, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from semidense.cache.document import FORMAT_VERSION
+from semidense.cache.entries.check import read_plain
+from semidense.cache.entries.entry import Entry
+from semidense.cache.entries.quarantine import move_anything
+from semidense.cache.errors import CacheUnavailable
+from semidense.cache.files import make_folder, reading, remove, walk, writing
+from semidense.cache.layout import Layout
+from semidense.cache.owner import is_abandoned, is_foreign
+from semidense.cache.processes.lease import cleaning, in_use, remove_stale
+from semidense.cache.processes.locks import held, is_held
+from semidense.cache.store import Store
+
+Kind = Literal["entry", "draft", "orphan", "old format", "damaged record", "quarantine", "checkpoint", "stale lock"]
+FOREIGN_SECONDS = 7 * 86400.0
+"""After this time without a change, a draft of another host belongs to a process that is gone."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Which sound entries may go; the leftovers of crashes always may.
+
+    Attributes:
+        keep: keys that stay whatever their age, such as those that a configuration reaches; None: no entry is
+            deleted for being unreachable, and age and size alone decide.
+        seconds: entries unused for longer may go; None: age does not matter.
+        bytes: entries go, longest unused first, until no more is left; None: size does not matter.
+    """
+
+    keep: frozenset[str] | None = None
+    seconds: float | None = None
+    bytes: int | None = None
+
+
+@dataclass(frozen=True)
+class Item:
+    """Something that can be deleted.
+
+    Attributes:
+        kind: what it is.
+        name: the key of an entry, the name of anything else.
+        reason: why it can go, in a few words.
+        size: bytes on disk.
+        paths: what is deleted; what makes it visible comes first.
+        entry: of an entry, what its record tells.
+    """
+
+    kind: Kind
+    name: str
+    reason: str
+    size: int
+    paths: tuple[Path, ...]
+    entry: Entry | None = None
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What can be deleted, and what else is there.
+
+    Attributes:
+        items: what can go.
+        kept: how many entries stay.
+        kept_bytes: their size.
+        used: how many of those stay only since a running process uses them.
+    """
+
+    items: tuple[Item, ...]
+    kept: int
+    kept_bytes: int
+    used: int
+
+
+def survey(store: Store, limits: Limits) -> Survey:
+    """Return what can be deleted; nothing is changed.
+
+    Raises:
+        CacheUnavailable: if the file system refuses.
+    """
+    layout, used = store.layout, in_use(store.layout)
+    entries = {entry.key: entry for entry in store.entries()}
+    chosen = dict(_chosen(layout, entries.values(), limits))
+    going = {key: reason for key, reason in chosen.items() if key not in used}
+    items = [_entry_item(layout, entries[key], reason) for key, reason in going.items()]
+    kept = [entry for key, entry in entries.items() if key not in going]
+    items += _leftovers(layout, entries.keys(), used)
+    return Survey(tuple(items), len(kept), sum(entry.size for entry in kept), len(chosen) - len(going))
+
+
+def last_used(layout: Layout, key: str) -> float:
+    """Return when an entry was made or a run last used it, in seconds since the epoch; 0 if it is gone."""
+    try:
+        return layout.record(key).stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+def _chosen(layout: Layout, entries: Iterable[Entry], limits: Limits) -> Iterator[tuple[str, str]]:
+    """Yield the key of each entry that may go, with the reason, longest unused first."""
+    if limits == Limits():
+        return
+    now, entries = time.time(), list(entries)
+    left = sum(entry.size for entry in entries)
+    free = [entry for entry in entries if limits.keep is None or entry.key not in limits.keep]
+    unreachable = "not reached by what is to be kept; " if limits.keep is not None else ""
+    for used, entry in sorted(((last_used(layout, each.key), each) for each in free), key=lambda pair: pair[0]):
+        old = limits.seconds is not None and now - used > limits.seconds
+        over = limits.bytes is not None and left > limits.bytes
+        if old or over or limits.seconds is limits.bytes is None:
+            left -= entry.size
+            why = "unused for long" if old else "the cache is too large" if over else ""
+            yield entry.key, f"{unreachable}{why}".removesuffix("; ")
+
+
+def _entry_item(layout: Layout, entry: Entry, reason: str) -> Item:
+    paths = (layout.record(entry.key), layout.entry(entry.key))
+    return Item("entry", entry.key, reason, entry.size, paths, entry)
+
+
+def _leftovers(layout: Layout, sound: Iterable[str], used: Container[str]) -> Iterator[Item]:
+    """Yield what crashes, damage and older formats left."""
+    entries = set(sound)
+    broken = {key: _unreadable(layout, key) for key in layout.record_keys() if key not in entries}
+    yield from (item for item in broken.values() if item)
+    for key in layout.entry_keys():
+        if key not in entries and key not in broken:
+            yield _item("orphan", key, "data without a record: its writer was killed", layout.entry(key))
+    for path in _things(layout.drafts):
+        if is_abandoned(path.name):
+            yield _item("draft", path.name, "its process is gone", path)
+        elif is_foreign(path.name) and time.time() - _changed(path) > FOREIGN_SECONDS:
+            yield _item("draft", path.name, "of another host, unchanged for a week", path)
+    for path in _things(layout.quarantine):
+        yield _item("quarantine", path.name, "damaged, and made again when it is needed", path)
+    for path in _things(layout.checkpoints):
+        key = path.name.removeprefix(".")[:64]  # of a half-written one too
+        if key not in used and (key in entries or path.name.startswith(".")):
+            yield _item("checkpoint", key, "its product is there, or its writer was killed", path)
+    for path in (*_things(layout.locks), *_things(layout.leases)):
+        if not is_held(path):
+            yield _item("stale lock", path.name, "its process is gone", path)
+
+
+def _unreadable(layout: Layout, key: str) -> Item | None:
+    """Return a record that is not well-formed as an item; None for one of a newer format, which is not ours."""
+    path = layout.record(key)
+    try:
+        version = json.loads(read_plain(path))["format"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        version = None
+    newer = type(version) is int and version > FORMAT_VERSION
+    older = type(version) is int and version < FORMAT_VERSION
+    kind: Kind = "old format" if older else "damaged record"
+    reason = f"of format {version}, this program reads {FORMAT_VERSION}" if older else "its record cannot be read"
+    return None if newer else _item(kind, key, reason, path, layout.entry(key))
+
+
+def _item(kind: Kind, name: str, reason: str, *paths: Path) -> Item:
+    return Item(kind, name, reason, sum(map(_bytes, paths)), paths)
+
+
+def _things(folder: Path) -> list[Path]:
+    with reading(folder):
+        return sorted(folder.iterdir()) if folder.is_dir() else []
+
+
+def _changed(path: Path) -> float:
+    try:
+        return path.lstat().st_mtime
+    except OSError:
+        return time.time()
+
+
+def _bytes(path: Path) -> int:
+    try:
+        if path.is_symlink() or not path.is_dir():
+            return path.lstat().st_size
+        return sum(
+            thing.stat(follow_symlinks=False).st_size
+            for _, thing in walk(path)
+            if not thing.is_dir(follow_symlinks=False)
+        )
+    except OSError:
+        return 0
+
+
+def collect(store: Store, items: Iterable[Item]) -> tuple[Item, ...]:
+    """Delete what ``survey`` found, except what a process has begun to use since; return what was deleted.
+
+    Raises:
+        CacheUnavailable: if the file system refuses; what was deleted by then stays deleted.
+    """
+    layout, trash, done, items = store.layout, store.layout.new_draft(), [], tuple(items)
+    try:
+        with writing(layout.root):
+            make_folder(trash)
+        with cleaning(layout):
+            used = in_use(layout)
+            for number, item in enumerate(items):
+                if (
+                    item.kind != "stale lock"
+                    and item.name not in used
+                    and _move_away(layout, item, trash / str(number))
+                ):
+                    done.append(item)
+        done += [item for item in items if item.kind == "stale lock" and remove_stale(layout, item.paths[0])]
+    finally:
+        remove(trash)
+    return tuple(done)
+
+
+def _move_away(layout: Layout, item: Item, target: Path) -> bool:
+    """Rename an item's paths to where nobody sees them; return whether there was still anything to move."""
+    if item.kind in ("draft", "quarantine", "checkpoint"):
+        return _rename_all(item, target)
+    with held(layout.lock("commit", item.name)):
+        return _is_still(layout, item) and _rename_all(item, target)
+
+
+def _is_still(layout: Layout, item: Item) -> bool:
+    """Return whether a record, or its absence, is what the survey found: a writer may have come since."""
+    if item.kind == "orphan":
+        return not os.path.lexists(layout.record(item.name))
+    if item.kind == "entry":
+        return True
+    return (found := _unreadable(layout, item.name)) is not None and found.kind == item.kind
+
+
+def _rename_all(item: Item, target: Path) -> bool:
+    moved = False
+    for number, path in enumerate(item.paths):
+        try:
+            move_anything(path, target.with_name(f"{target.name}-{number}"))
+            moved = True
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            raise CacheUnavailable(f"cannot delete {path} from the cache: {error.strerror or error}") from error
+    return moved

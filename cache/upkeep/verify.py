@@ -1,0 +1,130 @@
+"""Look at a whole cache: is every entry sound, and what takes up the space? Nothing is changed."""
+
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from semidense.cache.entries.check import inspect
+from semidense.cache.errors import DamagedEntry, EntryNotFound
+from semidense.cache.files import THREADS, reading, walk
+from semidense.cache.store import Store
+
+Progress = Callable[[int, int], None]
+"""Called with the number of entries done and their total."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What ``verify`` found.
+
+    Attributes:
+        sound: keys of the entries that are, to the byte, what was published.
+        damaged: what is wrong, by key.
+        quarantined: why each thing in quarantine is there, by the name of its folder.
+    """
+
+    sound: tuple[str, ...]
+    damaged: Mapping[str, str]
+    quarantined: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Where the bytes of a cache are.
+
+    Attributes:
+        stages: bytes of the entries of each stage.
+        labels: for each name in labels, such as ``scene``: bytes of the entries of each value.
+        quarantine: bytes of damaged entries that were moved aside.
+        drafts: bytes of work in progress, or left by processes that are gone.
+        orphans: bytes of data that have no well-formed record.
+        total: bytes of all files in the cache.
+    """
+
+    stages: Mapping[str, int]
+    labels: Mapping[str, Mapping[str, int]]
+    quarantine: int
+    drafts: int
+    orphans: int
+    total: int
+
+
+def verify(store: Store, keys: Iterable[str] | None = None, progress: Progress | None = None) -> Report:
+    """Read every byte of every entry again, whatever the store's policy, and list what is in quarantine.
+
+    Args:
+        store: the cache.
+        keys: the entries to look at; all of them if None.
+        progress: told after each entry.
+
+    Returns:
+        The report. An entry that is deleted meanwhile is in neither list, one that ``keys`` names and
+        that never was there is among the damaged.
+
+    Raises:
+        InvalidKey: if one of ``keys`` is not a key.
+        CacheUnavailable: if the file system refuses.
+    """
+    wanted = sorted(set(store.layout.record_keys() if keys is None else keys))
+    findings: dict[str, str | None] = {}
+    with ThreadPoolExecutor(THREADS) as pool:
+        for key, finding in zip(wanted, pool.map(lambda key: _finding(store, key, keys is None), wanted), strict=True):
+            findings[key] = finding
+            if progress:
+                progress(len(findings), len(wanted))
+    sound = tuple(key for key, finding in findings.items() if finding is None)
+    return Report(sound, {key: finding for key, finding in findings.items() if finding}, _quarantined(store))
+
+
+def _finding(store: Store, key: str, may_vanish: bool) -> str | None:
+    """Return what is wrong with an entry, None if it is sound, nothing ("") if it is gone and may be."""
+    try:
+        inspect(store.layout, key, "full", remember=False)
+    except EntryNotFound as error:
+        return "" if may_vanish else str(error)
+    except DamagedEntry as error:
+        return str(error)
+    return None
+
+
+def _quarantined(store: Store) -> dict[str, str]:
+    """Return the reason of each thing in quarantine, by folder."""
+    folder, reasons = store.layout.quarantine, {}
+    with reading(folder):
+        for path in sorted(folder.iterdir()) if folder.is_dir() else ():
+            reasons[path.name] = "unknown: its reason was never written"
+            with suppress(FileNotFoundError, NotADirectoryError):
+                reasons[path.name] = (path / "reason.txt").read_text(encoding="utf-8", errors="replace").strip()
+    return reasons
+
+
+def size(store: Store) -> Sizes:
+    """Add up the bytes of a cache, by what they are; a cache that does not exist has none.
+
+    Raises:
+        CacheUnavailable: if the file system refuses.
+    """
+    stages: dict[str, int] = {}
+    labels: dict[str, dict[str, int]] = {}
+    recorded = set()
+    for entry in store.entries():
+        recorded.add(entry.key)
+        stages[entry.recipe.stage] = stages.get(entry.recipe.stage, 0) + entry.size
+        for name, value in entry.label.items():
+            values = labels.setdefault(name, {})
+            values[value] = values.get(value, 0) + entry.size
+    layout = store.layout
+    orphans = sum(_bytes(layout.entry(key)) for key in layout.entry_keys() if key not in recorded)
+    return Sizes(stages, labels, _bytes(layout.quarantine), _bytes(layout.drafts), orphans, _bytes(layout.root))
+
+
+def _bytes(path: Path) -> int:
+    """Return the bytes of all files in a folder; a file that vanishes meanwhile counts nothing."""
+    total = 0
+    with reading(path), suppress(FileNotFoundError):
+        for _, thing in walk(path) if path.is_dir() else ():
+            with suppress(FileNotFoundError):
+                total += 0 if thing.is_dir(follow_symlinks=False) else thing.stat(follow_symlinks=False).st_size
+    return total

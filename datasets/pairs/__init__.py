@@ -1,0 +1,1 @@
+"""A user's own pairs of images: from files, from arrays, from folders of many."""

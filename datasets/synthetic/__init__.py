@@ -1,0 +1,1 @@
+"""Scenes drawn by the program, with exact ground truth."""

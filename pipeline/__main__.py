@@ -1,0 +1,5 @@
+"""Run the command line: ``python -m semidense.pipeline`` is ``pipeline``."""
+
+from semidense.pipeline.cli.main import main
+
+main()

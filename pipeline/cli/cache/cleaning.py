@@ -1,0 +1,119 @@
+"""Clean a cache: show what can go and why, and delete it when asked to."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.markup import escape
+from rich.table import Table
+
+from semidense.cache import Store
+from semidense.cache.upkeep.gc import Item, Limits, Survey, collect, survey
+from semidense.pipeline.api import Task, open_store, status
+from semidense.pipeline.cli.console import print_json
+from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.plan import Planned
+from semidense.pipeline.results.text import bytes_text, results
+
+_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0, "w": 7 * 86400.0}
+_BYTES = {"B": 1, "kB": 10**3, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
+_NUMBER = re.compile(r"(\d+(?:\.\d+)?)\s*([A-Za-z]+)", re.ASCII)
+SHOWN = 40
+"""Lines of a list of things to delete; more are counted."""
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What a user asks to be cleaned: the arguments of ``cache gc``."""
+
+    keep: tuple[str, ...] = ()
+    configs: tuple[Path, ...] = ()
+    train: bool = False
+    unused_for: str | None = None
+    max_size: str | None = None
+
+    def limits(self, folder: Path | None) -> Limits:
+        """Return what that means for the entries of a cache.
+
+        Raises:
+            UsageError, DatasetError: if a dataset, a configuration, an age or a size is none.
+        """
+        if (self.configs or self.train) and not self.keep:
+            raise UsageError("--config and --train say how a dataset is kept: name it with --keep DATASET")
+        seconds = _amount(self.unused_for, _UNITS, "--unused-for", "30d, 12h, 5min")
+        largest = _amount(self.max_size, _BYTES, "--max-size", "20GB, 500MB")
+        return Limits(
+            frozenset(self._reached(folder)) if self.keep else None, seconds, None if largest is None else int(largest)
+        )
+
+    def _reached(self, folder: Path | None) -> Iterator[str]:
+        """Yield the keys that the datasets reach, each with each configuration."""
+        store = open_store(folder)
+        for dataset in self.keep:
+            for config in self.configs or (None,):
+                for planned in status(Task(dataset, config=config, train=self.train, cache=folder)).steps:
+                    yield from [planned.key] if planned.key else _possible(store, planned)
+
+
+def _possible(store: Store, planned: Planned) -> Iterator[str]:
+    """Yield the entries that a step may turn out to be, while what it is made from is not there."""
+    step = planned.step
+    for entry in store.history(step.label):
+        same = (entry.recipe.code, entry.recipe.params, entry.recipe.environment)
+        if same == (step.code, step.settings, step.environment):
+            yield entry.key
+
+
+def _amount(text: str | None, units: dict[str, float] | dict[str, int], option: str, examples: str) -> float | None:
+    if text is None:
+        return None
+    match = _NUMBER.fullmatch(text.strip())
+    if match is None or match[2] not in units:
+        raise UsageError(f"{option} {text!r}: write a number and a unit, such as {examples}")
+    return float(match[1]) * units[match[2]]
+
+
+def clean(folder: Path | None, wish: Wish, *, yes: bool, as_json: bool) -> None:
+    """Print what can be deleted and why; delete it if ``yes``."""
+    store = open_store(folder)
+    found = survey(store, wish.limits(folder))
+    deleted = collect(store, found.items) if yes and found.items else ()
+    if as_json:
+        rows = [
+            {"kind": item.kind, "name": item.name, "reason": item.reason, "size": item.size, "deleted": item in deleted}
+            for item in found.items
+        ]
+        print_json({"items": rows, "kept": found.kept, "kept_bytes": found.kept_bytes, "in_use": found.used})
+        return
+    _print_items(found.items)
+    _print_summary(found, deleted, yes)
+
+
+def _print_items(items: tuple[Item, ...]) -> None:
+    table = Table("what", "product", "scene", "size", "name", "why", box=None)
+    table.columns[3].justify = "right"
+    for item in items[:SHOWN]:
+        label = item.entry.label if item.entry else {}
+        names = [escape(label.get(name, "")) for name in ("product", "scene")]
+        table.add_row(item.kind, *names, bytes_text(item.size), escape(item.name[:12]), escape(item.reason))
+    if items:
+        results().print(table)
+    if len(items) > SHOWN:
+        results().print(f"and {len(items) - SHOWN} more; --json lists all")
+
+
+def _print_summary(found: Survey, deleted: tuple[Item, ...], yes: bool) -> None:
+    console = results()
+    items = deleted if yes else found.items
+    size = bytes_text(sum(item.size for item in items))
+    kept = f"keeps {found.kept} entries, {bytes_text(found.kept_bytes)}"
+    used = f", {found.used} of them only since a running process uses them" if found.used else ""
+    if not found.items:
+        console.print(f"nothing to delete; {kept}{used}")
+    elif yes:
+        console.print(f"deleted {len(items)} things, {size}; {kept}{used}")
+    else:
+        console.print(
+            f"would delete {len(items)} things, {size}; {kept}{used}\nnothing was deleted: add --yes for that"
+        )

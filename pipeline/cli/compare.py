@@ -1,0 +1,102 @@
+"""The command ``compare``. Nothing heavy is imported before it runs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from semidense.pipeline.cli.options import (
+    CacheOption,
+    ConfigOption,
+    JsonOption,
+    SceneOption,
+    SchedulerOption,
+    SetOption,
+    WorkersOption,
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command()(compare)
+
+
+def compare(
+    dataset: Annotated[str, typer.Argument(help="Scenes with a ground truth, such as middlebury:DIR.")] = "motorcycle",
+    scene: SceneOption = None,
+    experiment: Annotated[
+        list[str] | None, typer.Option("--experiment", help="raw, density or auc; may be repeated [default: all].")
+    ] = None,
+    train_on: Annotated[
+        str | None,
+        typer.Option(
+            "--train-on", help="Train on this dataset what must be trained: O1, CCNN, networks of fewer channels."
+        ),
+    ] = None,
+    protocol: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--protocol",
+            help="Also train and test by the paper's own protocols: same (pairs) or folds (over them, with those of "
+            "--train-on); may be repeated.",
+        ),
+    ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--without",
+            help="Leave out a matcher or measure, such as mc_cnn_accurate, or ablation, the networks of fewer "
+            "channels; may be repeated.",
+        ),
+    ] = None,
+    threshold: Annotated[
+        float, typer.Option("--threshold", help="Error in px above which tables and figures call a pixel wrong.")
+    ] = 1.0,
+    settings: SetOption = None,
+    config: ConfigOption = None,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Where comparison.csv, comparison.json and the figures go.")
+    ] = Path("comparison"),
+    scheduler: SchedulerOption = None,
+    workers: WorkersOption = None,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Set other matchers beside the two networks.
+
+    The paper's experiments: raw maps, error at equal density, confidence measures.
+    """
+    from semidense.pipeline import api
+    from semidense.pipeline.cli import console
+    from semidense.pipeline.comparison import experiments as comparison
+    from semidense.pipeline.comparison import files as comparison_report
+    from semidense.pipeline.comparison import tables
+    from semidense.pipeline.execution.progress import ProgressWatch
+    from semidense.pipeline.plan.errors import UsageError
+    from semidense.stages.metrics import THRESHOLDS
+
+    if threshold not in THRESHOLDS:
+        offered = ", ".join(f"{each:g}" for each in THRESHOLDS)
+        raise UsageError(f"--threshold {threshold:g}: figures are worked out for {offered} px")
+    task = api.Task(dataset, tuple(scene or ()), tuple(settings or ()), config, False, cache)
+    experiments = experiment or comparison.EXPERIMENTS
+    with ProgressWatch() as watch:
+        found = comparison.compare(
+            task,
+            experiments,
+            train_on,
+            protocol or (),
+            without=without or (),
+            watch=watch,
+            scheduler=scheduler,
+            workers=workers,
+        )
+    files = comparison_report.write_comparison(found, output, threshold)
+    if as_json:
+        console.print_json(comparison_report.as_json(found, files))
+        return
+    tables.print_comparison(found, api.mask_kinds(found.result).values(), threshold)
+    console.print_notes(found.notes)
+    for file in files:
+        typer.echo(f"wrote {file}")
+    typer.echo(console.reuse_line(found.result.made.values()))

@@ -1,0 +1,150 @@
+"""Print results: tables for people, one JSON object for scripts. Results go to stdout."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from semidense.cache import Change
+from semidense.pipeline.execution.scheduler import totals
+from semidense.pipeline.plan.causes import PENDING
+from semidense.pipeline.plan.plan import Made, Plan, Planned
+from semidense.pipeline.results.metric_rows import FIGURES, HEADINGS, SWEEP_THRESHOLD, mean_rows
+from semidense.pipeline.results.text import results
+
+STYLES = {"hit": "green", "made": "cyan", "stale": "yellow", "missing": "dim"}
+
+
+def print_json(value: Mapping[str, Any]) -> None:
+    """Print one JSON object, and nothing else."""
+    Console(soft_wrap=True).out(json.dumps(value, allow_nan=False), highlight=False)
+
+
+def step_rows(plan: Plan, made: Mapping[str, Made]) -> list[dict[str, Any]]:
+    """Return the rows that ``run`` and ``status`` promise: product, scene, key, state, changed, why, seconds."""
+    return [_step_row(planned, made.get(planned.step.id)) for planned in plan.steps]
+
+
+def _step_row(planned: Planned, made: Made | None) -> dict[str, Any]:
+    fresh = made is not None and not made.reused
+    state = "made" if fresh else "hit" if made else planned.state
+    return {
+        "product": planned.step.product,
+        "scene": planned.step.scene,
+        "key": made.key if made else planned.key,
+        "state": state,
+        "changed": [_change_row(change) for change in planned.changed],
+        **({"damage": planned.damage} if planned.damage else {}),
+        "why": list(planned.causes),
+        "seconds": made.seconds if made else planned.seconds,
+    }
+
+
+def _change_row(change: Change) -> dict[str, Any]:
+    return {"field": change.field, "old": change.old, "new": change.new}
+
+
+def print_plan(plan: Plan) -> None:
+    """Print a line a product and scene: its state, its key, and why it is not a hit."""
+    table = Table("product", "scene", "state", "key", "why", box=None, pad_edge=False)
+    for planned in plan.steps:
+        state = f"[{STYLES[planned.state]}]{planned.state}[/]"
+        scene, reason = escape(planned.step.scene), escape(why(planned))
+        table.add_row(planned.step.product, scene, state, (planned.key or "")[:12], reason)
+    console = results()
+    console.print(table)
+    print_notes(plan.notes)
+    todo: dict[str, int] = {}
+    for planned in plan.todo():
+        todo[planned.step.product] = todo.get(planned.step.product, 0) + 1
+    hits = len(plan.steps) - len(plan.todo())
+    making = ", ".join(f"{count} {product}" for product, count in todo.items()) or "nothing"
+    console.print(f"reuses {hits} products, makes {making}", highlight=False)
+
+
+def why(planned: Planned) -> str:
+    """Return why a step is not a hit, in one line; nothing for a hit."""
+    if planned.damage:
+        return f"damaged: {planned.damage}"
+    if planned.state == "missing":
+        return "never made" if planned.key else "never made; its inputs are not there yet"
+    if planned.causes:
+        return "; ".join(_telling(planned.causes))
+    above = [change.field.removeprefix("inputs.") for change in planned.changed if change.new == PENDING]
+    own = [str(change) for change in planned.changed if change.new != PENDING]
+    return "; ".join([*_telling(own), *([f"made after {', '.join(above)}"] if above else [])])
+
+
+def _telling(changes: Sequence[str], most: int = 3) -> Iterable[str]:
+    """Return the first changes, and how many more there are."""
+    yield from changes[:most]
+    if len(changes) > most:
+        yield f"and {len(changes) - most} more"
+
+
+def print_notes(notes: Sequence[str]) -> None:
+    """Print what a person should know; many of a kind in one line."""
+    console = Console(stderr=True, soft_wrap=True)
+    for note in notes[:5]:
+        console.print(f"note: {note}", highlight=False, style="dim", markup=False)
+    if len(notes) > 5:
+        console.print(f"note: and {len(notes) - 5} more like these", style="dim", highlight=False)
+
+
+def reuse_line(made: Iterable[Made]) -> str:
+    """Return one line that says what was reused and what was made."""
+    counts = totals(made)
+    reused = sum(old for old, _ in counts.values())
+    fresh = ", ".join(f"{new} {product}" for product, (_, new) in counts.items() if new)
+    return f"reused {reused} products, made {fresh or 'nothing'}"
+
+
+def print_metrics(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -> None:
+    """Print the table of metrics: non-occluded pixels, every threshold, and the mean of several scenes.
+
+    Args:
+        rows: as ``run --json`` gives them.
+        masks: where the mask of each scene comes from.
+    """
+    rows = [row for row in rows if row["mask"] == "nonocc"]
+    if not rows:
+        return
+    swept = len({_swept(row) for row in rows}) > 1
+    table = Table("scene", "threshold px", "R", *(HEADINGS[name] for name in FIGURES), "pixels", box=None)
+    for column in table.columns[1:]:
+        column.justify = "right"
+    if swept:
+        table.add_column("settings")
+    for row in [*rows, *mean_rows(rows)]:
+        table.add_row(*_cells(row), *([escape(_swept(row))] if swept else []))
+    console = results()
+    console.print(table)
+    kinds = ", ".join(sorted(set(masks.values())))
+    console.print(
+        f"mask: nonocc ({kinds}); bad and errors are of reported pixels, raw bad counts unreported ones as wrong; "
+        "thresholds in pixels of the image at hand",
+        style="dim",
+        highlight=False,
+    )
+
+
+def _swept(row: Mapping[str, Any]) -> str:
+    """Return the settings of a variant, but for R, which has a column of its own."""
+    settings = str(row.get("variant", "")).split(", ")
+    return ", ".join(each for each in settings if not each.startswith("semidense.R="))
+
+
+def _cells(row: Mapping[str, Any]) -> list[str]:
+    digits = {"auc": 4, "auc_optimal": 4, "avgerr": 2, "rms": 2}
+    figures = [f"{row[name]:.{digits.get(name, 1)}f}" if name in row else "-" for name in FIGURES]
+    threshold = f"{row['R']:g}" if "R" in row else "-"
+    return [escape(row["scene"]), f"{row['threshold_px']:g}", threshold, *figures, str(row["pixels"])]
+
+
+def print_sweep(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -> None:
+    """Print error and density for each R: the mean over scenes, or the scene if there is one."""
+    chosen = [row for row in rows if row["mask"] == "nonocc" and row["threshold_px"] == SWEEP_THRESHOLD]
+    print_metrics(mean_rows(chosen) or chosen, masks)

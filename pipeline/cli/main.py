@@ -1,0 +1,75 @@
+"""The command line. Nothing heavy is imported before a command runs: ``--help`` must answer at once."""
+
+import signal
+import sys
+from typing import Annotated, Any
+
+import typer
+
+from semidense.pipeline.cli import compare, match, run, show
+from semidense.pipeline.cli.cache.commands import cache_app
+
+app = typer.Typer(
+    help="Semi-dense stereo matching with two CNNs; every stage is cached.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # rich takes as long to import as all the rest of --help
+    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"pipeline {version('semidense-stereo')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Take the options that stand before a command."""
+
+
+for commands in (run, match, compare, show):
+    commands.register(app)
+app.add_typer(cache_app, name="cache")
+
+
+class _Stopped(BaseException):
+    """SIGINT or SIGTERM arrived. Not KeyboardInterrupt: typer would wait for the tasks that still compute."""
+
+
+def _stop(number: int, _: Any) -> None:  # noqa: ANN401
+    raise _Stopped(number)
+
+
+def main() -> None:
+    """Run the command line; a user's mistake is one line and exit code 2."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _stop)
+    try:
+        app(prog_name="pipeline")
+    except _Stopped as stop:
+        _leave(128 + int(stop.args[0]))
+    except Exception as error:
+        from semidense.pipeline.plan.errors import USER_ERRORS
+
+        if not isinstance(error, USER_ERRORS):
+            raise
+        print(f"pipeline: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+
+
+def _leave(code: int) -> None:
+    """Exit at once: drafts are deleted by now, and tasks that still compute have nothing left to write to."""
+    import os
+
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)

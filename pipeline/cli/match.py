@@ -1,0 +1,208 @@
+"""The command ``match``: a user's own pair, or many of them. Nothing heavy is imported before it runs."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from semidense.pipeline.cli.options import (
+    CacheOption,
+    ConfigOption,
+    DryRunOption,
+    JsonOption,
+    SchedulerOption,
+    SetOption,
+    WorkersOption,
+)
+
+if TYPE_CHECKING:
+    from semidense.pipeline.api import Task
+    from semidense.pipeline.pairs.match import Match, Wishes
+
+_EXAMPLES = {"density": "80% or 0.8", "max-error": "2% or 0.02"}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command()(match)
+
+
+def match(
+    left: Annotated[str, typer.Argument(help="The left view; or a folder, a pattern with one *, or a list (.csv).")],
+    right: Annotated[str | None, typer.Argument(help="The right view, as LEFT; nothing for a list.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Write everything to this folder.")] = Path("matched"),
+    min_disp: Annotated[
+        int | None, typer.Option(help="Smallest disparity, px [default: the calibration's, else estimated].")
+    ] = None,
+    max_disp: Annotated[int | None, typer.Option(help="Largest disparity, px.")] = None,
+    calib: Annotated[
+        list[str] | None,
+        typer.Option(help="calib.txt, OpenCV's YAML or XML, or twice: ROS's left and right files."),
+    ] = None,
+    unit: Annotated[str | None, typer.Option(help="Unit of length of an OpenCV calibration: mm, cm or m.")] = None,
+    threshold: Annotated[
+        float | None, typer.Option("--R", help="Least confidence that is kept [default: 0.9].")
+    ] = None,
+    density: Annotated[
+        str | None, typer.Option(help="Keep this share of the image instead, the most confident; such as 80%.")
+    ] = None,
+    max_error: Annotated[
+        str | None, typer.Option("--max-error", help="Keep what is wrong no more often than this; such as 2%.")
+    ] = None,
+    calibrated: Annotated[
+        bool, typer.Option("--calibrated", help="Give the confidence, and take --R, as a measured probability.")
+    ] = False,
+    left_right: Annotated[bool, typer.Option("--left-right", help="Drop what the right view contradicts.")] = False,
+    subpixel: Annotated[bool, typer.Option("--subpixel", help="Refine disparities below a pixel.")] = False,
+    fill: Annotated[
+        bool, typer.Option("--fill", help="Fill holes with the background: dense, partly guessed.")
+    ] = False,
+    right_view: Annotated[bool, typer.Option("--right-view", help="Write the right view's raw map too.")] = False,
+    formats: Annotated[str, typer.Option("--format", help="Formats of the maps.")] = "pfm,png,tiff,npy",
+    scene: Annotated[
+        list[str] | None, typer.Option("--scene", help="Only this pair of several; may be repeated.")
+    ] = None,
+    settings: SetOption = None,
+    config: ConfigOption = None,
+    dry_run: DryRunOption = False,
+    scheduler: SchedulerOption = None,
+    workers: WorkersOption = None,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Match your own rectified pair, or many.
+
+    Writes disparities, confidence and, with a calibration, depth and points as files.
+    """
+    from semidense.datasets.pairs.pair import PairOptions, pair_spec
+    from semidense.pipeline.api import Task
+    from semidense.pipeline.pairs.match import Wishes
+
+    options = PairOptions(tuple(calib or ()), unit, min_disp, max_disp)
+    sides = [left] if right is None else [left, right]
+    task = Task(pair_spec(sides, options), tuple(scene or ()), tuple(settings or ()), config, False, cache)
+    wishes = Wishes(
+        R=threshold,
+        density=_share("density", density),
+        max_error=_share("max-error", max_error),
+        calibrated=calibrated,
+        left_right=left_right,
+        subpixel=subpixel,
+        fill=fill,
+        right_view=right_view,
+    )
+    kinds = _formats(formats)
+    if dry_run:
+        _plan(task, wishes, as_json)
+    else:
+        _carry_out(task, wishes, output, kinds, {"scheduler": scheduler, "workers": workers}, as_json)
+
+
+def _plan(task: "Task", wishes: "Wishes", as_json: bool) -> None:
+    from dataclasses import replace
+
+    from semidense.pipeline import api
+    from semidense.pipeline.cli import console
+
+    plan = api.status(replace(task, settings=(*task.settings, *wishes.settings)), wishes.product)
+    if as_json:
+        console.print_json({"steps": console.step_rows(plan, {})})
+    else:
+        console.print_plan(plan)
+
+
+def _carry_out(
+    task: "Task", wishes: "Wishes", output: Path, kinds: Sequence[str], how: dict[str, Any], as_json: bool
+) -> None:
+    from semidense.pipeline.cli import console
+    from semidense.pipeline.execution.progress import ProgressWatch
+    from semidense.pipeline.pairs.match import match_all
+    from semidense.pipeline.pairs.match_files import require_place, save_all
+
+    require_place(output)
+    with ProgressWatch() as watch:
+        found = match_all(task, wishes, watch=watch, **how)
+    summaries = save_all(found, output, kinds)
+    for each in found:
+        for warning in each.warnings:
+            print(f"warning: {each.scene.name}: {warning} (see survey.png)", file=sys.stderr)
+    if as_json:
+        console.print_json({"pairs": summaries})
+        return
+    for each, about in zip(found, summaries, strict=True):
+        _say(each, about)
+    if len(found) == 1:
+        _draw(found[0])
+    print(console.reuse_line(_results(found)))
+
+
+def _say(match: "Match", about: dict[str, Any]) -> None:
+    """Print one pair's result: what was searched, what was kept, where it is."""
+    from semidense.stages.evaluation.calibration.table import told
+
+    low, high = match.disparities.minimum, match.disparities.maximum
+    ends = " (estimated from the images)" if match.scene.open_ends else ""
+    print(f"{match.scene.name}: {about['rows']} x {about['columns']} px, disparities {low} to {high} px{ends}")
+    kept = about["density_percent"] - about["guessed_percent"]
+    print(f"  kept {kept:.1f} % of the pixels, at R = {told(match.R)} ({about['R_from']})")
+    if match.basis:
+        print(f"  {about['R_basis']}")
+    if match.wishes.fill:
+        print(f"  {about['guessed_percent']:.1f} % are filled in: guesses (guessed.png)")
+    for note in about["notes"]:
+        print(f"  {note}")
+    print(f"  wrote {len(about['files']) + 1} files to {about['folder']}; summary.json says what each holds")
+
+
+def _draw(match: "Match") -> None:
+    """Draw the map of a single pair, if stdout is a terminal that can show it."""
+    from rich.console import Console
+
+    from semidense.pipeline.cli.terminal import can_draw, draw_picture
+
+    if can_draw(Console()):
+        from semidense.pipeline.cli.terminal import small_disparity
+
+        draw_picture(*small_disparity(match.disparity))
+
+
+def _results(found: "Sequence[Match]") -> list[Any]:
+    """Return every result once, as it was first met: a later run only finds again what an earlier one made."""
+    first: dict[str, Any] = {}
+    for run in (found[0].others[0], found[0].result, *found[0].others[1:]):
+        for made in run.made.values():
+            first.setdefault(made.key, made)
+    return list(first.values())
+
+
+def _share(name: str, text: str | None) -> float | None:
+    """Return what ``80%`` or ``0.8`` means.
+
+    Raises:
+        UsageError: if it is no share above 0 and up to 1.
+    """
+    if text is None:
+        return None
+    from semidense.pipeline.plan.errors import UsageError
+
+    try:
+        value = float(text[:-1]) / 100 if text.endswith("%") else float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0 < value <= 1:
+        raise UsageError(f"{name} {text!r}: write a share of the pixels, such as {_EXAMPLES[name]}")
+    return value
+
+
+def _formats(text: str) -> list[str]:
+    from semidense.pipeline.files.map_files import FORMATS
+    from semidense.pipeline.plan.config import nearest
+    from semidense.pipeline.plan.errors import UsageError
+
+    chosen = list(dict.fromkeys(kind.strip() for kind in text.split(",") if kind.strip()))
+    for kind in chosen:
+        if kind not in FORMATS:
+            raise UsageError(f"no format {kind!r}; {nearest(kind, FORMATS)}")
+    return chosen

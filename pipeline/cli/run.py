@@ -1,0 +1,222 @@
+"""The commands that make products and tell of them. Nothing heavy is imported before one runs."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from semidense.pipeline.cli.options import (
+    CacheOption,
+    ConfigOption,
+    DatasetArgument,
+    DryRunOption,
+    ForceOption,
+    JsonOption,
+    OutputOption,
+    ProductArgument,
+    SceneOption,
+    SchedulerOption,
+    SetOption,
+    TrainOption,
+    UptoOption,
+    WorkersOption,
+)
+
+if TYPE_CHECKING:
+    from semidense.pipeline.api import Result, Task
+    from semidense.pipeline.plan.plan import Plan
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    for command in (run, sweep, status, explain, inspect):
+        app.command()(command)
+
+
+def run(
+    dataset: DatasetArgument = "motorcycle",
+    upto: UptoOption = "metrics",
+    scene: SceneOption = None,
+    settings: SetOption = None,
+    config: ConfigOption = None,
+    train: TrainOption = False,
+    dry_run: DryRunOption = False,
+    force: ForceOption = None,
+    output: OutputOption = None,
+    scheduler: SchedulerOption = None,
+    workers: WorkersOption = None,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Make a dataset's products, reusing all that is cached."""
+    from semidense.pipeline import api
+    from semidense.pipeline.cli import console
+    from semidense.pipeline.execution.progress import ProgressWatch
+
+    task = _task(dataset, scene, settings, config, train, cache)
+    if dry_run:
+        return _print_plan(api.status(task, upto, force or ()), as_json)
+    with ProgressWatch() as watch:
+        result = api.run(task, upto, forced=force or (), watch=watch, scheduler=scheduler, workers=workers)
+    files = _export(result, output)
+    if as_json:
+        steps = console.step_rows(result.plan, result.made)
+        console.print_json({"steps": steps, "metrics": result.metrics, "files": [str(file) for file in files]})
+    else:
+        _print_result(result, files)
+    return None
+
+
+def sweep(
+    dataset: DatasetArgument = "motorcycle",
+    thresholds: Annotated[str, typer.Option("--R", help="first:last:step, or numbers with commas.")] = "0.05:0.95:0.05",
+    scene: SceneOption = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="section.field=value1,value2; all combinations are made.")
+    ] = None,
+    config: ConfigOption = None,
+    train: TrainOption = False,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Where sweep.csv and sweep.png go.")] = Path("sweep"),
+    scheduler: SchedulerOption = None,
+    workers: WorkersOption = None,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Filter at many thresholds R, and over other settings.
+
+    Says what was reused; --set section.field=value1,value2 tries several values of any setting.
+    """
+    from semidense.pipeline import api
+    from semidense.pipeline.cli import console
+    from semidense.pipeline.execution.progress import ProgressWatch
+    from semidense.pipeline.files.run_files import write_sweep
+
+    task = _task(dataset, scene, None, config, train, cache)
+    with ProgressWatch() as watch:
+        result = api.sweep(task, thresholds, settings or (), watch=watch, scheduler=scheduler, workers=workers)
+    files = write_sweep(result.metrics, output)
+    if as_json:
+        steps = console.step_rows(result.plan, result.made)
+        console.print_json({"steps": steps, "metrics": result.metrics, "files": [str(file) for file in files]})
+    else:
+        console.print_sweep(result.metrics, api.mask_kinds(result))
+        _say_files(files)
+        print(console.reuse_line(result.made.values()))
+
+
+def status(
+    dataset: DatasetArgument = "motorcycle",
+    upto: UptoOption = "metrics",
+    scene: SceneOption = None,
+    settings: SetOption = None,
+    config: ConfigOption = None,
+    train: TrainOption = False,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say what is cached, and what changed if it is not."""
+    from semidense.pipeline import api
+
+    _print_plan(api.status(_task(dataset, scene, settings, config, train, cache), upto), as_json)
+
+
+def explain(
+    product: ProductArgument,
+    dataset: DatasetArgument = "motorcycle",
+    scene: SceneOption = None,
+    settings: SetOption = None,
+    config: ConfigOption = None,
+    train: TrainOption = False,
+    graph: Annotated[Path | None, typer.Option("--graph", help="Draw what it was made from (SVG, PNG, PDF).")] = None,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show what a product's key is made of.
+
+    Also why it would be made again, and what it was made from.
+    """
+    from semidense.pipeline import api
+    from semidense.pipeline.cli.explain import draw_provenance, explanation, print_explanation
+
+    planned = api.explain(_task(dataset, scene, settings, config, train, cache), product)
+    found = explanation(planned, api.open_store(cache))
+    if graph:
+        draw_provenance(planned, api.open_store(cache), graph)
+    if as_json:
+        from semidense.pipeline.cli.console import print_json
+
+        print_json(found)
+    else:
+        print_explanation(found, graph)
+
+
+def inspect(
+    product: ProductArgument,
+    dataset: DatasetArgument = "motorcycle",
+    scene: SceneOption = None,
+    png: Annotated[Path | None, typer.Option("--png", help="Draw the product into this file.")] = None,
+    pixel: Annotated[str | None, typer.Option("--pixel", help="Y,X: whose cost curve to draw.")] = None,
+    disparity: Annotated[int | None, typer.Option("--disparity", help="Which cost slice to draw, px.")] = None,
+    settings: SetOption = None,
+    config: ConfigOption = None,
+    train: TrainOption = False,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show a cached product: its xarray, figures and picture.
+
+    Also how to open it in Python. A map is drawn in terminals that can show it.
+    """
+    from semidense.pipeline import api
+    from semidense.pipeline.cli.inspect import draw, inspection, print_inspection
+
+    planned = api.explain(_task(dataset, scene, settings, config, train, cache), product)
+    found = inspection(planned, api.open_store(cache))
+    if png:
+        draw(found, png, pixel, disparity)
+    print_inspection(found, png, as_json)
+
+
+def _task(
+    dataset: str,
+    scenes: list[str] | None,
+    settings: list[str] | None,
+    config: Path | None,
+    train: bool,
+    cache: Path | None,
+) -> "Task":
+    from semidense.pipeline.api import Task
+
+    return Task(dataset, tuple(scenes or ()), tuple(settings or ()), config, train, cache)
+
+
+def _print_plan(plan: "Plan", as_json: bool) -> None:
+    from semidense.pipeline.cli import console
+
+    if as_json:
+        console.print_json({"steps": console.step_rows(plan, {}), "metrics": []})
+    else:
+        console.print_plan(plan)
+
+
+def _print_result(result: "Result", files: list[Path]) -> None:
+    from semidense.pipeline import api
+    from semidense.pipeline.cli import console
+
+    console.print_metrics(result.metrics, api.mask_kinds(result))
+    console.print_notes(result.plan.notes)
+    _say_files(files)
+    print(console.reuse_line(result.made.values()))
+
+
+def _say_files(files: list[Path]) -> None:
+    for file in files:
+        print(f"wrote {file}")
+
+
+def _export(result: "Result", output: Path | None) -> list[Path]:
+    if output is None:
+        return []
+    from semidense.pipeline.files.run_files import export
+
+    return export(result, output)

@@ -1,0 +1,1 @@
+"""Other matchers and confidence measures beside ours: the paper's experiments."""

@@ -1,0 +1,40 @@
+"""What the transforms are worth: matching-Nets that see different channels, trained alike from nothing."""
+
+from collections.abc import Iterable, Iterator
+
+from semidense.datasets import Dataset, SceneSource
+from semidense.pipeline.api import Result, Task
+from semidense.pipeline.comparison.rows import Judged, Row, raw_rows
+from semidense.pipeline.plan.config import Config
+from semidense.pipeline.plan.steps import Request
+
+ABLATION = {
+    "gray + rank + companion, trained alike": ("gray", "rank", "companion"),
+    "gray + rank, trained alike": ("gray", "rank"),
+    "gray + companion, trained alike": ("gray", "companion"),
+    "gray only, trained alike": ("gray",),
+}
+"""matching-Nets that see different channels; the last is what MC-CNN sees."""
+
+
+def ablation_request(task: Task, dataset: Dataset, training: tuple[SceneSource, ...]) -> Request:
+    """Return the request for raw maps of matching-Nets that are trained alike, on different channels."""
+    configs = {
+        method: Config.load(task.config, [*task.settings, f"channels.use={_as_list(channels)}"])
+        for method, channels in ABLATION.items()
+    }
+    return Request(dataset, configs, "disparity", train=True, training=training, also=("truth",))
+
+
+def ablation_rows(result: Result) -> Iterator[Row]:
+    """Yield the rows of the raw maps of a run of ``ablation_request``."""
+    targets = [(result.made[step_id], variant) for step_id, variant in result.plan.targets]
+    truths = {made.step.scene: made.key for made, _ in targets if made.step.product == "truth"}
+    for made, variant in targets:
+        if made.step.product == "disparity":
+            judged = Judged(made.step.scene, result.store.read(truths[made.step.scene]))
+            yield from raw_rows(judged, variant, result.store.read(made.key)["disparity"])
+
+
+def _as_list(channels: Iterable[str]) -> str:
+    return "[" + ", ".join(f'"{channel}"' for channel in channels) + "]"

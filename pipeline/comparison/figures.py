@@ -1,0 +1,160 @@
+"""Figures of a comparison: a dot a scene and method, and error against invalid pixels."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from semidense.pipeline.figures.colours import BLUE, QUIET, RED, disparity_rgb, disparity_span
+from semidense.pipeline.figures.curves import draw_matchers
+from semidense.pipeline.figures.drawing import new_figure
+from semidense.stages.stage import Array, Arrays
+from semidense.stages.transforms.gray import to_gray
+
+Row = Mapping[str, Any]
+_UNITS = {"raw_bad": "wrong or unreported pixels (%)", "auc": "area under the error curve (1)"}
+_MARKED = (0.0, 0.5, 0.9, 0.99)
+"""Values of R that are written beside the curve."""
+
+
+def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 9.5) -> Figure:
+    """Return a figure with a line a method: a dot a scene, and a bar at their mean.
+
+    Args:
+        rows: of one experiment, mask and threshold; the first method is drawn at the top. Where they have an
+            ``auc_optimal``, its mean is drawn as a line across.
+        figure: the key that is drawn.
+        title: stands above.
+        width: of the figure, inches.
+    """
+    methods = list(dict.fromkeys(row["method"] for row in rows))
+    drawn = new_figure(title)
+    drawn.set_size_inches(width, 1.8 + 0.45 * len(methods))
+    axes = drawn.subplots()
+    values = [[row[figure] for row in rows if row["method"] == method and figure in row] for method in methods]
+    axes.barh(methods, [np.mean(each) for each in values], color=QUIET, label="mean")
+    for method, each in zip(methods, values, strict=True):
+        axes.plot(each, [method] * len(each), "o", color=BLUE, markersize=4, label="a scene")
+    optimal = [row["auc_optimal"] for row in rows if "auc_optimal" in row and row["method"] == methods[0]]
+    if optimal:
+        axes.axvline(float(np.mean(optimal)), color=RED, linestyle="--", label="mean of the optimal area")
+    axes.invert_yaxis()
+    axes.set(xlabel=_UNITS[figure], xlim=(0, None))
+    axes.grid(axis="x", alpha=0.3)
+    handles, labels = axes.get_legend_handles_labels()
+    drawn.legend(*_first_of_each(handles, labels), loc="outside lower center", ncols=3, frameon=False)
+    return drawn
+
+
+def _first_of_each(handles: Sequence[Any], labels: Sequence[str]) -> tuple[list[Any], list[str]]:
+    first = dict(reversed(list(zip(labels, handles, strict=True))))
+    return list(first.values()), list(first)
+
+
+def density_figure(means: Sequence[Row]) -> Figure:
+    """Return error against invalid pixels: our curve over R, a point each other matcher.
+
+    Args:
+        means: mean rows of one mask and threshold, of the experiments ``curve`` and ``density``.
+    """
+    drawn = new_figure("Error versus invalid pixels")
+    drawn.set_size_inches(9.5, 6)
+    axes = drawn.subplots()
+    curve = [row for row in means if row["experiment"] == "curve" and "bad" in row]
+    axes.plot([row["invalid"] for row in curve], [row["bad"] for row in curve], color=BLUE, linewidth=2)
+    axes.lines[0].set_label("dual-cnn, over R")
+    for row in curve:
+        if row["R"] in _MARKED:
+            place = row["invalid"], row["bad"]
+            axes.plot(*place, ".", color=BLUE, markersize=9)
+            axes.annotate(f"R = {row['R']:g}", place, xytext=(6, 6), textcoords="offset points", fontsize="small")
+    others = [row for row in means if row["experiment"] == "density" and "bad" in row and "R" not in row]
+    draw_matchers(axes, others)
+    mask, threshold, scenes = means[0]["mask"], means[0]["threshold_px"], means[0]["scene"]
+    axes.set_xlabel(f"invalid: {mask} pixels without a disparity (%), {scenes} scenes")
+    axes.set_ylabel(f"bad: reported {mask} pixels off by more than {threshold:g} px (%)")
+    axes.margins(x=0.12)
+    axes.set_ylim(bottom=0)
+    axes.set_xlim(left=0)
+    axes.grid(alpha=0.3)
+    axes.legend(loc="upper right", frameon=False)
+    return drawn
+
+
+if TYPE_CHECKING:
+    from semidense.pipeline.comparison.experiments import Comparison
+
+SCENES = 3
+"""Scenes on a sheet, at most."""
+_OTHERS = {
+    "sgm": "SGM",
+    "sncc": "SNCC",
+    "census": "census",
+    "mc_cnn": "MC-CNN fast",
+    "mc_cnn_accurate": "MC-CNN accurate",
+}
+_FLAT = 2
+"""Gray levels between neighbours up to which a pixel counts as untextured."""
+_WIDTH = 2.6
+"""Width of a picture, inches."""
+
+
+def sheets(found: "Comparison") -> dict[str, Figure]:
+    """Return two sheets by file name: the scenes whose views are lit most differently, and those of least texture."""
+    images = {scene: found.images(scene) for scene in found.scenes}
+    return {
+        "lighting.png": _sheet(found, _hardest(images, "lighting"), "Views lit most differently"),
+        "texture.png": _sheet(found, _hardest(images, "texture"), "Least texture"),
+    }
+
+
+def _hardest(images: Mapping[str, Arrays], kind: str) -> list[str]:
+    measure = {"lighting": lighting_difference, "texture": untextured_share}[kind]
+    return sorted(images, key=lambda scene: -measure(images[scene]))[:SCENES]
+
+
+def lighting_difference(images: Arrays) -> float:
+    """Return how much the mean gray of the two views differs, in gray levels."""
+    left, right = images["moments"][:, 0]
+    return float(abs(left - right))
+
+
+def untextured_share(images: Arrays) -> float:
+    """Return the share of pixels whose gray differs from the next one's in both directions by at most 2 levels."""
+    gray = to_gray(images["left"]).astype(np.int16)
+    across, down = np.abs(np.diff(gray, axis=1))[:-1], np.abs(np.diff(gray, axis=0))[:, :-1]
+    return float(np.mean((across <= _FLAT) & (down <= _FLAT)))
+
+
+def _sheet(found: "Comparison", scenes: list[str], title: str) -> Figure:
+    """Return a figure with a row a scene: view, truth, raw map, semi-dense map, the others' maps."""
+    arrays = {scene: found.arrays(scene) for scene in scenes}
+    rows = {scene: _pictures(products, found.R) for scene, products in arrays.items()}
+    names = list(next(iter(rows.values())))
+    height, width = next(iter(rows.values()))[names[0]].shape[:2]
+    drawn = new_figure(f"{title}; blue: far, yellow: near, black: no disparity")
+    drawn.set_size_inches(_WIDTH * len(names) + 0.5, len(rows) * (_WIDTH * height / width + 0.1) + 0.6)
+    panels = drawn.subplots(len(rows), len(names), squeeze=False)
+    for panel_row, (scene, pictures) in zip(panels, rows.items(), strict=True):
+        for axes, (name, picture) in zip(panel_row, pictures.items(), strict=True):
+            axes.imshow(picture, interpolation="nearest")
+            axes.set(xticks=[], yticks=[], title=name if scene == scenes[0] else "")
+        low, high = disparity_span(arrays[scene]["truth"]["disparity"])
+        panel_row[0].set_ylabel(f"{scene}\n{low:g} to {high:g} px", parse_math=False)
+    return drawn
+
+
+def _pictures(products: Mapping[str, Arrays], R: float | None) -> dict[str, NDArray[np.uint8]]:
+    """Return a scene's pictures by name; all disparities in the colours of the truth's range."""
+    truth = products["truth"]["disparity"]
+    span = disparity_span(truth)
+    maps: dict[str, Array] = {
+        "truth": truth,
+        "dual-cnn raw": products["disparity"]["disparity"],
+        "dual-cnn" + (f", R = {R:g}" if R is not None else ""): products["semidense"]["disparity"],
+        **{name: products[product]["disparity"] for product, name in _OTHERS.items() if product in products},
+    }
+    left = np.repeat(to_gray(products["images"]["left"])[..., np.newaxis], 3, axis=2)
+    return {"left view": left} | {name: disparity_rgb(values, *span) for name, values in maps.items()}

@@ -1,0 +1,82 @@
+"""What a comparison leaves: tables, ``comparison.csv``, ``comparison.json``, and figures."""
+
+import csv
+import io
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from semidense.datasets.formats.atomic import atomic_write
+from semidense.pipeline.comparison.experiments import Comparison
+from semidense.pipeline.comparison.figures import density_figure, dots_figure, sheets
+from semidense.pipeline.comparison.rows import FIGURES, Row
+from semidense.pipeline.comparison.tables import THRESHOLD, TITLES, at, of, quoted
+from semidense.pipeline.files.writing import explaining, save_png, writable_folder
+
+COLUMNS = ("experiment", "scene", "method", "mask", "threshold_px", "R", "pixels", *FIGURES, "quoted", "data")
+"""The columns of ``comparison.csv``."""
+
+
+def as_json(found: Comparison, files: Iterable[Path] = ()) -> dict[str, Any]:
+    """Return a comparison as one object for scripts.
+
+    Returns:
+        ``rows`` and ``means`` in the form of metrics rows with their ``experiment``; ``quoted``: the paper's figures,
+        each with its ``data``; ``unavailable``: ``method`` and ``why``; ``notes``; ``files``.
+    """
+    return {
+        "rows": found.rows,
+        "means": found.means,
+        "quoted": quoted(found),
+        "unavailable": found.unavailable,
+        "notes": list(found.notes),
+        "files": [str(file) for file in files],
+    }
+
+
+def write_comparison(found: Comparison, folder: Path, threshold: float = THRESHOLD) -> list[Path]:
+    """Write ``comparison.csv``, ``comparison.json`` and the figures; return their paths.
+
+    Args:
+        found: the comparison.
+        folder: where to.
+        threshold: of the figures, one of ``THRESHOLDS``, px; the other files have all.
+
+    Raises:
+        UsageError: if the folder cannot be written.
+    """
+    writable_folder(folder)
+    written = [folder / "comparison.csv", folder / "comparison.json"]
+    for name, drawn in _figures(found, threshold).items():
+        save_png(drawn, folder / name)
+        written.append(folder / name)
+    _write(written[0], _csv([*found.rows, *found.means, *quoted(found)]))
+    _write(written[1], json.dumps(as_json(found, written), allow_nan=False, indent=1))
+    return written
+
+
+def _write(path: Path, text: str) -> None:
+    with explaining(path), atomic_write(path) as file:
+        file.write(text.encode())
+
+
+def _csv(rows: Sequence[Row]) -> str:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, COLUMNS, extrasaction="raise", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _figures(found: Comparison, threshold: float) -> dict[str, Any]:
+    """Return the figures by file name: a figure an experiment that was run, and the sheets."""
+    rows = at(found.rows, threshold)
+    figures = {
+        f"{experiment}.png": dots_figure(of(rows, experiment), figure, title=TITLES[experiment])
+        for experiment, figure in (("raw", "raw_bad"), ("auc", "auc"))
+        if of(rows, experiment)
+    }
+    if of(rows, "density"):
+        figures["density.png"] = density_figure(at(found.means, threshold))
+    return figures | sheets(found)

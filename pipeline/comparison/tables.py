@@ -1,0 +1,132 @@
+"""Print a comparison: a table an experiment, and the paper's figures beside."""
+
+from collections.abc import Iterable, Sequence
+from textwrap import fill
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from semidense.pipeline.comparison.experiments import Comparison
+from semidense.pipeline.comparison.paper_figures import QUOTED
+from semidense.pipeline.comparison.rows import FIGURES, Row
+from semidense.pipeline.results.text import results
+
+MASK, THRESHOLD = "nonocc", 1.0
+"""Mask, and unless another is wished for threshold in px of the image at hand, of tables and figures."""
+TITLES = {
+    "raw": "Raw maps: wrong or unreported pixels, %",
+    "auc": "Confidence of the raw map: area under the error curve; lower is better",
+}
+_DENSITY = ("invalid", "bad", "bad_dual_cnn", "avgerr", "rms", "A50", "A90", "A95", "A99")
+_SHORT = {"invalid": "invalid %", "bad": "bad %", "bad_dual_cnn": "bad % of dual-cnn, same density", "auc": "AUC"}
+
+
+def quoted(found: Comparison) -> list[Row]:
+    """Return the paper's figures for the experiments that were run."""
+    run = {row["experiment"] for row in found.rows}
+    return [row for row in QUOTED if row["experiment"] in run]
+
+
+def at(rows: Iterable[Row], threshold: float) -> list[Row]:
+    """Return the rows at a threshold and the mask of tables and figures."""
+    return [row for row in rows if row["mask"] == MASK and row["threshold_px"] == threshold]
+
+
+def of(rows: Iterable[Row], experiment: str) -> list[Row]:
+    """Return the rows of an experiment."""
+    return [row for row in rows if row["experiment"] == experiment]
+
+
+def print_comparison(found: Comparison, masks: Iterable[str], threshold: float = THRESHOLD) -> None:
+    """Print a table an experiment, the paper's figures beside, and why something is missing.
+
+    Args:
+        found: the comparison.
+        masks: where the non-occlusion masks of the scenes come from.
+        threshold: error above which a pixel is wrong, one of ``THRESHOLDS``, px.
+    """
+    console = results()
+    rows, means = at(found.rows, threshold), at(found.means, threshold)
+    for experiment, figure in (("raw", "raw_bad"), ("auc", "auc")):
+        if of(rows, experiment):
+            table = _by_scene(of(rows, experiment), of(means, experiment), experiment, figure)
+            console.print(_fitted(table, console), "")
+    if of(rows, "density"):
+        console.print(_fitted(_density_table(of(means, "density")), console), "")
+    _print_quoted(console, quoted(found))
+    kinds = ", ".join(sorted(set(masks)))
+    console.print()
+    text = f"mask: {MASK} ({kinds}); wrong: off by more than {threshold:g} px of the image at hand"
+    console.print(text, style="dim", highlight=False)
+    for reason in dict.fromkeys(each["why"] for each in found.unavailable):
+        methods = ", ".join(each["method"] for each in found.unavailable if each["why"] == reason)
+        console.print(f"not run: {methods}: {reason}", style="dim", highlight=False, markup=False)
+
+
+def _by_scene(rows: Sequence[Row], means: Sequence[Row], experiment: str, figure: str) -> Table:
+    """Return a table of scenes and methods: down goes whichever are more."""
+    methods = {row["method"]: (row["method"], figure) for row in means}
+    if experiment == "auc":
+        methods["optimal"] = (means[0]["method"], "auc_optimal")
+    cells = {(row["scene"], row["method"]): row for row in rows} | {("mean", row["method"]): row for row in means}
+    scenes = [*dict.fromkeys(row["scene"] for row in rows), "mean"]
+    shown = {
+        (scene, name): _cell(cells.get((scene, method), {}), value)
+        for scene in scenes
+        for name, (method, value) in methods.items()
+    }
+    if len(methods) < len(scenes):
+        table = _table(TITLES[experiment], "scene", *methods)
+        for scene in scenes:
+            table.add_row(escape(scene), *(shown[scene, name] for name in methods))
+    else:
+        table = _table(TITLES[experiment], "method", *scenes)
+        for name in methods:
+            table.add_row(escape(name), *(shown[scene, name] for scene in scenes))
+    return table
+
+
+def _density_table(means: Sequence[Row]) -> Table:
+    """Return a table of what semi-dense maps report: means over the scenes."""
+    plural = "" if means[0]["scene"] == "mean of 1" else "s"
+    title = f"Semi-dense maps, {means[0]['scene']} scene{plural}; errors of reported pixels, px"
+    table = _table(title, "method", "R", *(_SHORT.get(name, name) for name in _DENSITY))
+    for row in means:
+        threshold = f"{row['R']:g}" if "R" in row else "-"
+        table.add_row(escape(row["method"]), threshold, *(_cell(row, name) for name in _DENSITY))
+    return table
+
+
+def _fitted(table: Table, console: Console) -> Table:
+    """Return the table, its headings a few words a line if it is too wide for the console: words stay whole."""
+    if console.measure(table, options=console.options.update(width=1000)).maximum > console.width:
+        for column in table.columns:
+            words = str(column.header).split()
+            column.header = fill(" ".join(words), max(map(len, words)), break_on_hyphens=False)
+    return table
+
+
+def _print_quoted(console: Console, quoted: Sequence[Row]) -> None:
+    """Print the paper's figures, those of the same data together."""
+    console.print("Quoted from the paper: other data, another resolution", style="italic")
+    groups: dict[tuple[str, str], list[Row]] = {}
+    for row in quoted:
+        (figure,) = (name for name in FIGURES if name in row)
+        groups.setdefault((figure, row["data"]), []).append(row)
+    for (figure, data), rows in groups.items():
+        values = ", ".join(f"{row['method']} {_cell(row, figure)}" for row in rows)
+        console.print(f"{_SHORT.get(figure, figure)}, {data}:", style="dim", markup=False)
+        console.print(f"  {values}", markup=False)
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(*(escape(column) for column in columns), title=title, title_justify="left", box=None, pad_edge=False)
+    for column in table.columns[1:]:
+        column.justify = "right"
+    return table
+
+
+def _cell(row: Row, figure: str) -> str:
+    digits = 4 if figure.startswith("auc") else 2
+    return f"{row[figure]:.{digits}f}" if figure in row else "-"

@@ -1,0 +1,1 @@
+"""How a plan is carried out: tasks on threads or on a cluster."""

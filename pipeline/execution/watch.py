@@ -1,0 +1,39 @@
+"""What is told how a run goes on."""
+
+from typing import Protocol
+
+from semidense.cache import Draft
+from semidense.pipeline.plan.plan import Made
+from semidense.pipeline.plan.steps import Step
+
+
+class Watch(Protocol):
+    """What is told how a run goes on, from any thread."""
+
+    def begun(self, step: Step, draft: Draft, tiles: int) -> None:
+        """A product is being made in ``draft``, in so many tiles."""
+
+    def waiting(self, step: Step, holder: str) -> None:
+        """Another process is making the product: this run waits for it."""
+
+    def advanced(self, step: Step, done: int, total: int, note: str) -> None:
+        """A tile, or a training step, is done."""
+
+    def published(self, made: Made) -> None:
+        """A product is there."""
+
+
+class Unwatched:
+    """A watch for workers in other processes: it sees nothing."""
+
+    def begun(self, step: Step, draft: Draft, tiles: int) -> None:
+        """See nothing."""
+
+    def waiting(self, step: Step, holder: str) -> None:
+        """See nothing."""
+
+    def advanced(self, step: Step, done: int, total: int, note: str) -> None:
+        """See nothing."""
+
+    def published(self, made: Made) -> None:
+        """See nothing."""

@@ -1,0 +1,210 @@
+"""Write what a run made as files that other programs read: maps, pictures, weights, figures, the configuration.
+
+::
+
+    FOLDER/
+        config.json                     what was asked for and with which settings each result was made
+        metrics.csv                     the rows of the figures
+        matching_net.safetensors        of trained networks; also evaluation_net.safetensors
+        calibration.safetensors         what the confidence was measured to be worth, if it was asked for
+        SCENE/
+            disparity.pfm               raw disparity, px; infinity: none
+            disparity.png               the same in colours, black: none
+            confidence.pfm, .png        probability that the disparity is right
+            semidense.pfm, .png         disparities that are trusted; of a sweep semidense-R0.90.pfm ...
+
+Where the variants of a sweep differ in a file's content, the settings that it depends on are in its name.
+"""
+
+import csv
+import io
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from semidense.datasets.formats.atomic import atomic_write
+from semidense.datasets.formats.pfm import write_pfm
+from semidense.pipeline.api import Result
+from semidense.pipeline.execution.tasks import provenance
+from semidense.pipeline.figures.colours import confidence_rgb, disparity_rgb, disparity_span
+from semidense.pipeline.files.file_names import safe_names
+from semidense.pipeline.files.selection import Wanted, lineage, wanted
+from semidense.pipeline.files.writing import explaining, save_png, writable_folder, write_rgb
+from semidense.pipeline.plan.plan import Made
+from semidense.pipeline.plan.steps import LEARNT
+from semidense.pipeline.results.metric_rows import SWEEP_THRESHOLD
+from semidense.stages.metrics.stage import ROW
+
+COLUMNS = ("scene", "method", "mask", "threshold_px", "R", "pixels", *ROW)
+"""The columns of ``metrics.csv``: the keys of the rows that are promised to scripts."""
+_MAPS = ("disparity", "confidence", "semidense")
+_LAST = 50
+"""Training steps that the final loss is a mean of."""
+_Span = tuple[float, float]
+
+
+def export(result: Result, folder: Path) -> list[Path]:
+    """Write the results of a run into a folder; files that are there already are replaced, each at once.
+
+    Args:
+        result: of a run or a sweep. Scenes that were only trained on are left out.
+        folder: made if it is missing. Names of scenes are never taken for paths: what is unusual in them is
+            replaced, so that every file lies in this folder.
+
+    Returns:
+        The files, in the order in which they were written.
+
+    Raises:
+        UsageError: if the folder is a file, or cannot be written.
+        CacheError: if a result is no longer in the cache.
+    """
+    folder = Path(folder)
+    writable_folder(folder)
+    exporter = _Exporter(result, folder)
+    exporter.write_networks()
+    exporter.write_maps()
+    exporter.write_metrics()
+    exporter.write_config()
+    return exporter.written
+
+
+@dataclass
+class _Exporter:
+    """One export: what was found in the result, and the files written so far."""
+
+    result: Result
+    folder: Path
+    written: list[Path] = field(default_factory=list)
+    _spans: dict[str, _Span] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Find what there is, and name the scenes' folders."""
+        self.found = wanted(self.result, (*_MAPS, *LEARNT))
+        self.scenes = safe_names(self.result.made[step_id].step.scene for step_id, _ in self.result.plan.targets)
+
+    def write_networks(self) -> None:
+        """Write the trained networks and their calibration; shipped ones are files already."""
+        for each in self.found:
+            if each.product in LEARNT and each.made.step.inputs:
+                self._write(self.folder / f"{each.stem}.safetensors", _weights(self.result, each.made))
+
+    def write_maps(self) -> None:
+        """Write the maps of every scene, as numbers and in colours."""
+        for each in self.found:
+            if each.product in _MAPS:
+                self._write_map(each)
+
+    def _write_map(self, each: Wanted) -> None:
+        folder = self.folder / self.scenes[each.made.step.scene]
+        writable_folder(folder)
+        values = self._read(each.made, "confidence" if each.product == "confidence" else "disparity")
+        pfm, png = (folder / f"{each.stem}.{suffix}" for suffix in ("pfm", "png"))
+        with explaining(pfm):
+            write_pfm(pfm, values)
+        colours = confidence_rgb(values) if each.product == "confidence" else disparity_rgb(values, *self._span(each))
+        write_rgb(colours, png)
+        self.written += [pfm, png]
+
+    def _span(self, each: Wanted) -> _Span:
+        """Return the span of colours: that of the raw map, so that raw and filtered pictures compare."""
+        raw = next(step for step in lineage(self.result.made, each.made.step.id) if step.product == "disparity")
+        if raw.id not in self._spans:
+            self._spans[raw.id] = disparity_span(self._read(self.result.made[raw.id], "disparity"))
+        return self._spans[raw.id]
+
+    def _read(self, made: Made, name: str) -> Any:  # noqa: ANN401
+        return self.result.store.arrays(made.key)[name][...]
+
+    def write_metrics(self) -> None:
+        """Write the rows of the figures, if the run went so far."""
+        if self.result.metrics:
+            path = self.folder / "metrics.csv"
+            write_rows(self.result.metrics, path)
+            self.written.append(path)
+
+    def write_config(self) -> None:
+        """Write the command, the versions, and the settings that each result was made with."""
+        targets = [self._described(*target) for target in self.result.plan.targets]
+        document = provenance(sys.argv, {}) | {"configuration": targets}
+        self._write(self.folder / "config.json", (json.dumps(document, indent=2) + "\n").encode())
+
+    def _described(self, step_id: str, variant: str) -> dict[str, Any]:
+        """Return the settings and keys of a result and of everything it was made from."""
+        target = self.result.made[step_id].step
+        steps = {step.product: step for step in reversed(lineage(self.result.made, step_id))}
+        return {
+            "product": target.product,
+            "scene": target.scene,
+            "folder": self.scenes[target.scene],
+            "variant": variant,
+            "settings": {product: step.settings for product, step in steps.items()},
+            "keys": {product: self.result.made[step.id].key for product, step in steps.items()},
+        }
+
+    def _write(self, path: Path, data: bytes) -> None:
+        with explaining(path), atomic_write(path) as file:
+            file.write(data)
+        self.written.append(path)
+
+
+def _weights(result: Result, made: Made) -> bytes:
+    """Return the file of a trained network or a calibration; its metadata tell how it was made, and from what."""
+    from semidense.stages.weights import save_weights
+    from semidense.stages.weights.tables import save_table
+
+    entry = result.store.require(made.key)
+    steps = {step.product: step for step in lineage(result.made, made.step.id, over_training=True) if step.stage.inputs}
+    metadata = {
+        "configuration": {product: step.settings for product, step in steps.items()},
+        "training_data": entry.recipe.inputs,
+        "versions": entry.extras.get("versions", {}),
+        "key": entry.key,
+    }
+    arrays = result.store.read(made.key)
+    if made.step.product == "calibration":
+        return save_table(arrays, metadata)
+    loss = {"loss": float(np.mean(arrays["loss"][-_LAST:], dtype=np.float64)), "steps": int(arrays["loss"].size)}
+    return save_weights(made.step.product, arrays, metadata | loss)
+
+
+def write_rows(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Write metrics rows as CSV with the columns ``COLUMNS``; what does not apply is empty.
+
+    A last column ``variant`` is added only where rows of a sweep cannot be told apart without it.
+
+    Raises:
+        UsageError: if the file cannot be written.
+    """
+    named = {tuple(row.get(name) for name in COLUMNS[:5]) for row in rows}
+    columns = COLUMNS if len(named) == len(rows) else (*COLUMNS, "variant")
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    with explaining(path), atomic_write(path) as file:
+        file.write(text.getvalue().encode())
+
+
+def write_sweep(rows: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
+    """Write ``sweep.csv`` with every row and ``sweep.png`` with the curve; return their paths.
+
+    Where no threshold keeps a pixel, or another wish than R decides, there is no curve, and no picture.
+
+    Raises:
+        UsageError: if the folder cannot be written.
+    """
+    from semidense.pipeline.figures.curves import error_curve_figure  # Matplotlib takes a second to load
+
+    writable_folder(folder)
+    table, picture = folder / "sweep.csv", folder / "sweep.png"
+    write_rows(rows, table)
+    picture.unlink(missing_ok=True)
+    if not any("bad" in row and "R" in row for row in rows):
+        return [table]
+    save_png(error_curve_figure(rows, threshold=SWEEP_THRESHOLD), picture)
+    return [table, picture]

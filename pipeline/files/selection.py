@@ -1,0 +1,96 @@
+"""What a result was made from, and which of a run's results a user wants as files."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from semidense.pipeline.api import Result
+from semidense.pipeline.files.file_names import safe_names
+from semidense.pipeline.plan.plan import Made, Planned
+from semidense.pipeline.plan.steps import SPLIT, Step
+
+_THRESHOLD = "semidense.R="
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A result to write.
+
+    Attributes:
+        made: the result.
+        stem: the start of its file's name: the product; in a sweep also the settings that set it apart.
+    """
+
+    made: Made
+    stem: str
+
+    @property
+    def product(self) -> str:
+        """The name of its product."""
+        return self.made.step.product
+
+
+def lineage(
+    made: Mapping[str, Made | Planned], step_id: str, *, over_training: bool = False, up_to: str | None = None
+) -> list[Step]:
+    """Return a step and what it was made from, nearest first.
+
+    Args:
+        made: the results of a run, or the steps of a plan, by the step's id.
+        step_id: the step.
+        over_training: go on through the training scenes; without, only steps of the same scene and of the training
+            split are in it, one a product.
+        up_to: a product beyond which not to go.
+    """
+    found: dict[str, Step] = {}
+    waiting = [step_id]
+    for each in waiting:
+        if each not in found:
+            found[each] = step = made[each].step
+            if step.product == up_to:
+                continue
+            inputs = [ids for product, ids in step.inputs.items() if over_training or not step.takes_list(product)]
+            waiting += [each for ids in inputs for each in ids]
+    return list(found.values())
+
+
+def wanted(result: Result, products: Sequence[str]) -> list[Wanted]:
+    """Return the results of some products that stand behind what a run was asked for, scene by scene.
+
+    Those of the scenes asked for and of the training split; not those of scenes that were only trained on, nor the
+    networks of the folds of a calibration.
+    """
+    found: dict[tuple[str, str], dict[str, str]] = {}
+    for step_id, variant in result.plan.targets:
+        behind = lineage(result.made, step_id, over_training=True, up_to="calibration")
+        split = [step for step in behind if step.scene == SPLIT]
+        for step in [*split, *lineage(result.made, step_id)]:
+            found.setdefault((step.scene, step.product), {}).setdefault(step.id, variant)
+    scenes = dict.fromkeys(scene for scene, _ in found)
+    kinds = [(scene, product) for scene in scenes for product in products if (scene, product) in found]
+    return [
+        Wanted(result.made[step_id], stem)
+        for scene, product in kinds
+        for step_id, stem in _stems(result.made, product, found[scene, product]).items()
+    ]
+
+
+def _stems(made: Mapping[str, Made], product: str, variants: Mapping[str, str]) -> dict[str, str]:
+    """Return the start of a file's name for each of the results of one product and scene."""
+    if len(variants) == 1:
+        return dict.fromkeys(variants, product)
+    names = {step_id: f"{product}-{_differences(made, step_id, variant)}" for step_id, variant in variants.items()}
+    safe = safe_names(names.values())
+    return {step_id: safe[name] for step_id, name in names.items()}
+
+
+def _differences(made: Mapping[str, Made], step_id: str, variant: str) -> str:
+    """Return those settings of a variant that the step depends on."""
+    sections = {step.product for step in lineage(made, step_id, over_training=True)}
+    settings = [setting for setting in variant.split(", ") if setting.partition(".")[0] in sections]
+    return "-".join(_threshold(setting) if setting.startswith(_THRESHOLD) else setting for setting in settings)
+
+
+def _threshold(setting: str) -> str:
+    """Return ``semidense.R=0.9`` as ``R0.90``: files then sort by R."""
+    value = float(setting.removeprefix(_THRESHOLD))
+    return f"R{value:.2f}" if float(f"{value:.2f}") == value else f"R{value:g}"

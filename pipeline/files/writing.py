@@ -1,0 +1,62 @@
+"""Write files completely or not at all, and say in one line why one cannot be written."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from semidense.datasets.formats.atomic import atomic_write
+from semidense.pipeline.plan.errors import UsageError
+
+if TYPE_CHECKING:  # an export of maps does without matplotlib's figures, which take a second to load
+    from matplotlib.figure import Figure
+
+
+@contextmanager
+def explaining(path: Path) -> Iterator[None]:
+    """Turn the file system's refusal to write ``path`` into one line for the user.
+
+    Raises:
+        UsageError: with the path and the system's reason.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written ({error.strerror or error}); name another place") from error
+
+
+def save_png(figure: "Figure", path: Path) -> None:
+    """Write a figure as PNG; an existing file is replaced, a reader sees the old one or the new one.
+
+    Raises:
+        UsageError: if the file cannot be written.
+    """
+    with explaining(path), atomic_write(path) as file:
+        figure.savefig(file, format="png")
+
+
+def write_rgb(rgb: NDArray[np.uint8], path: Path) -> None:
+    """Write colours (y, x, 3) uint8 as a PNG of the same number of pixels; an existing file is replaced.
+
+    Raises:
+        UsageError: if the file cannot be written.
+    """
+    with explaining(path), atomic_write(path) as file:
+        Image.fromarray(rgb).save(file, "PNG")
+
+
+def writable_folder(folder: Path) -> None:
+    """Make a folder if it is missing.
+
+    Raises:
+        UsageError: if it is a file, or cannot be made or written to.
+    """
+    with explaining(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):  # permissions alone do not tell: the file system may be read-only
+            pass

@@ -1,0 +1,95 @@
+"""HTML from values: every text is escaped where it enters."""
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+from matplotlib.colors import Colormap, to_hex
+
+from semidense.pipeline.figures.colours import (
+    ERROR_COLOURS,
+    ERROR_LABELS,
+    NONE,
+    UNKNOWN,
+    confidence_colours,
+    disparity_colours,
+)
+
+Html = str
+"""A piece of a page. What is no piece of a page yet goes through ``text``."""
+
+
+def text(value: object) -> Html:
+    """Return any value as text of a page.
+
+    >>> text("a < b")
+    'a &lt; b'
+    """
+    return escape(str(value))
+
+
+def tag(name: str, *content: Html, **attributes: object) -> Html:
+    """Return an element. ``class_`` is the attribute ``class``, ``data_x`` is ``data-x``; None leaves one out.
+
+    >>> tag("p", text("1 < 2"), class_="note")
+    '<p class="note">1 &lt; 2</p>'
+    """
+    pairs = {key.rstrip("_").replace("_", "-"): value for key, value in attributes.items() if value is not None}
+    written = "".join(f' {key}="{escape(str(value))}"' for key, value in pairs.items())
+    return f"<{name}{written}>{''.join(content)}</{name}>"
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[object]], *, caption: str, words: int = 1) -> Html:
+    """Return a table that scrolls sideways by itself where it is too wide; the last row of several may be a mean.
+
+    Args:
+        head: names of the columns, with units.
+        rows: cells as text.
+        caption: what it shows, as text.
+        words: columns on the left that hold words; the others hold numbers and stand at the right.
+    """
+    cells = [[("word" if i < words else "number", each) for i, each in enumerate(row)] for row in [head, *rows]]
+    titles = "".join(tag("th", text(each), class_=kind, scope="col") for kind, each in cells[0])
+    body = "".join(
+        tag("tr", *(tag("th" if i == 0 else "td", text(each), class_=kind) for i, (kind, each) in enumerate(row)))
+        for row in cells[1:]
+    )
+    inner = tag("caption", tag("span", text(caption))) + tag("thead", tag("tr", titles)) + tag("tbody", body)
+    return tag("div", tag("table", inner), class_="scroll", tabindex=0, role="region", aria_label=caption)
+
+
+def folded(summary: str, *content: Html) -> Html:
+    """Return what is folded until one opens it."""
+    return tag("details", tag("summary", text(summary)), *content)
+
+
+_STOPS = 12
+"""Colours of a gradient."""
+
+
+def disparity_legend(span: tuple[float, float], none: str) -> Html:
+    """Return the legend of a disparity map; ``none`` says what black means."""
+    return _gradient(disparity_colours(), f"{span[0]:g} px (far)", f"{span[1]:g} px (near)") + swatch(NONE, none)
+
+
+def confidence_legend(none: str = "none") -> Html:
+    """Return the legend of a confidence map."""
+    return _gradient(confidence_colours(), "0 (wrong)", "1 (right)") + swatch(NONE, none)
+
+
+def error_legend(shares: list[str] | None = None, none: str = "no disparity") -> Html:
+    """Return the legend of a map of errors; with the share of each class, if they are given."""
+    told = [f"{label}: {share}" for label, share in zip(ERROR_LABELS, shares, strict=True)] if shares else ERROR_LABELS
+    classes = [swatch(colour, label) for colour, label in zip(ERROR_COLOURS, told, strict=True)]
+    return "".join([*classes, swatch(NONE, none), swatch(UNKNOWN, "truth unknown")])
+
+
+def _gradient(colours: Colormap, low: str, high: str) -> Html:
+    stops = ", ".join(to_hex(each) for each in colours(np.linspace(0, 1, _STOPS)))
+    bar = tag("span", class_="bar", style=f"background: linear-gradient(to right, {stops})")
+    return tag("span", text(low), bar, text(high), class_="scale")
+
+
+def swatch(colour: str, label: str) -> Html:
+    """Return a colour and what it means."""
+    return tag("span", tag("span", class_="swatch", style=f"background: {colour}"), text(label), class_="key")

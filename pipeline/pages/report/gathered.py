@@ -1,0 +1,128 @@
+"""What of a dataset is cached: the plan of a run, its steps scene by scene, and the maps and figures behind them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from semidense.cache import Entry, Store
+from semidense.pipeline.api import METHOD, Task, open_store, status
+from semidense.pipeline.files.selection import lineage
+from semidense.pipeline.pages.report.baselines import cached_baselines, compared_rows
+from semidense.pipeline.pages.scene_maps import SceneMaps
+from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.plan import Plan, Planned
+from semidense.pipeline.plan.steps import NETS, SPLIT
+from semidense.stages.metrics import metric_rows
+
+MASK, THRESHOLD_PX = "nonocc", 1.0
+"""Mask, and error in px of the image at hand, of the tables and curves that stand first."""
+
+
+@dataclass(frozen=True, eq=False)
+class GatheredScene:
+    """A scene and what of it is cached.
+
+    Attributes:
+        name: its name.
+        steps: the steps that are cached, by product.
+        store: the cache.
+        baselines: keys of the other matchers and confidence measures that are cached, by product.
+    """
+
+    name: str
+    steps: Mapping[str, Planned]
+    store: Store
+    baselines: Mapping[str, str]
+
+    @property
+    def keys(self) -> dict[str, str]:
+        """The keys of what is cached."""
+        return {product: planned.key for product, planned in self.steps.items() if planned.key}
+
+    @cached_property
+    def maps(self) -> SceneMaps | None:
+        """The scene's maps; None if there is nothing to look at."""
+        return SceneMaps.read(self.store, self.keys) if {"images", "disparity"} & set(self.steps) else None
+
+    @cached_property
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows of its figures; none if they are not cached."""
+        if "metrics" not in self.steps:
+            return []
+        return metric_rows(self.name, METHOD, self.steps["metrics"].step.R, self.store.read(self.keys["metrics"]))
+
+    @cached_property
+    def compared(self) -> list[dict[str, Any]]:
+        """The rows of the comparison with the baselines that are cached, at ``MASK`` and ``THRESHOLD_PX``."""
+        return compared_rows(self.name, {**self.keys, **self.baselines}, self.store, [MASK], [THRESHOLD_PX])
+
+
+@dataclass(frozen=True, eq=False)
+class Gathered:
+    """Everything that a report tells.
+
+    Attributes:
+        task: what was asked for.
+        plan: of a run up to the metrics: every step with its state.
+        store: the cache.
+        scenes: those asked for of which something is cached.
+        R: the threshold of the configuration.
+    """
+
+    task: Task
+    plan: Plan
+    store: Store
+    scenes: tuple[GatheredScene, ...]
+    R: float
+
+    @property
+    def hits(self) -> list[Planned]:
+        """The steps that are cached."""
+        return [planned for planned in self.plan.steps if planned.state == "hit"]
+
+    @cached_property
+    def entries(self) -> dict[str, Entry]:
+        """The records of what is cached, by key; baselines too."""
+        keys = [planned.key for planned in self.hits if planned.key]
+        keys += [key for scene in self.scenes for key in scene.baselines.values()]
+        return {key: self.store.require(key) for key in keys}
+
+    @cached_property
+    def networks(self) -> dict[str, Planned]:
+        """The steps of the networks that are cached."""
+        return {each.step.product: each for each in self.hits if each.step.product in NETS}
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows of the figures of all scenes."""
+        return [row for scene in self.scenes for row in scene.rows]
+
+    @property
+    def compared(self) -> list[dict[str, Any]]:
+        """The rows of the comparison of all scenes."""
+        return [row for scene in self.scenes for row in scene.compared]
+
+
+def gather(task: Task) -> Gathered:
+    """Look up what a run of ``task`` up to the metrics would find in the cache. Nothing is made.
+
+    Raises:
+        UsageError: if nothing of any scene is cached, with the command that makes it.
+    """
+    store, plan = open_store(task.cache), status(task)
+    request = task.request("metrics")
+    baselines = cached_baselines(request, store)
+    by_id = {planned.step.id: planned for planned in plan.steps}
+    scenes = []
+    for target, _ in plan.targets:
+        steps = {step.product: by_id[step.id] for step in lineage(by_id, target) if by_id[step.id].state == "hit"}
+        if {planned.step.scene for planned in steps.values()} - {SPLIT}:
+            name = by_id[target].step.scene
+            scenes.append(GatheredScene(name, steps, store, baselines.get(name, {})))
+    if not scenes:
+        raise UsageError(
+            f"nothing of {task.dataset} is cached in {store.root}: make it with `pipeline run {task.dataset}`"
+        )
+    config = next(iter(request.configs.values()))
+    return Gathered(task, plan, store, tuple(scenes), config.semidense.R)

@@ -1,0 +1,191 @@
+"""The page: its parts in order, each left out where nothing is cached for it."""
+
+import json
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from importlib.resources import files
+from itertools import chain
+from typing import Any
+
+from semidense.pipeline.comparison.figures import dots_figure
+from semidense.pipeline.execution.tasks import provenance
+from semidense.pipeline.figures.curves import error_curve_figure
+from semidense.pipeline.pages.html import Html, folded, table, tag, text
+from semidense.pipeline.pages.reliability import reliability, reliability_figure
+from semidense.pipeline.pages.report.figures_tables import (
+    auc_table,
+    matcher_points,
+    matchers_table,
+    measure_points,
+    metrics_tables,
+)
+from semidense.pipeline.pages.report.galleries import gallery
+from semidense.pipeline.pages.report.gathered import MASK, THRESHOLD_PX, Gathered
+from semidense.pipeline.pages.report.graph import graph, steps_table
+from semidense.pipeline.pages.report.networks import networks
+from semidense.pipeline.pages.report.pictures import svg
+from semidense.pipeline.pages.tally import Tally
+from semidense.pipeline.results.metric_rows import mean_rows
+
+_CURVE = tuple(percent / 100 for percent in range(0, 100, 5))
+"""The thresholds R of the curve."""
+
+
+def page(found: Gathered) -> str:
+    """Return the whole page; it loads nothing from anywhere."""
+    parts = [(title, body) for title, body in _parts(found) if body]
+    sections = [tag("section", tag("h2", text(title)), body, id=_anchor(title)) for title, body in parts]
+    links = [tag("li", tag("a", text(title), href=f"#{_anchor(title)}")) for title, _ in parts]
+    head = _head(f"{found.task.dataset}: report")
+    top = tag("header", *_title(found), _cards(found), tag("nav", tag("ul", *links), aria_label="Parts of this report"))
+    script = f"<script>{_resource('report.js')}</script>"
+    return f'<!doctype html>\n<html lang="en">{head}<body>{top}{tag("main", *sections)}{script}</body></html>\n'
+
+
+def _anchor(title: str) -> str:
+    return title.lower().replace(" ", "-")
+
+
+def _resource(name: str) -> str:
+    return (files("semidense.pipeline.pages.report") / name).read_text(encoding="utf-8")
+
+
+def _head(title: str) -> Html:
+    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+    return (
+        f'<head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{policy}">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
+        f"<title>{text(title)}</title><style>{_resource('report.css')}</style></head>"
+    )
+
+
+def _title(found: Gathered) -> Iterator[Html]:
+    yield tag("h1", text(f"Semi-dense stereo: {found.task.dataset}"))
+    settings = [f"--set {each}" for each in found.task.settings] + ["--train"] * found.task.train
+    told = f"with {' '.join(settings)}" if settings else "with the default settings"
+    yield tag("p", text(f"{told}; written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"), class_="quiet")
+
+
+def _cards(found: Gathered) -> Html:
+    """Return the figures that one looks for first."""
+    rows = [row for row in found.rows if row["mask"] == MASK and row["threshold_px"] == THRESHOLD_PX]
+    count = len(found.scenes)
+    cards = [(str(count), "scenes with something cached" if count > 1 else f"scene: {found.scenes[0].name}")]
+    if rows:
+        mean = (mean_rows(rows) or rows)[0]
+        cards += [(value, about) for name, value, about in _figures(mean, found.R) if name in mean]
+    return tag(
+        "div",
+        *(tag("div", tag("b", text(value)), tag("span", text(about)), class_="card") for value, about in cards),
+        class_="cards",
+    )
+
+
+def _figures(mean: dict[str, Any], R: float) -> list[tuple[str, str, str]]:
+    wrong = f"more than {THRESHOLD_PX:g} px off"
+    return [
+        ("raw_bad", f"{mean.get('raw_bad', 0):.1f} %", f"of all pixels {wrong} before filtering"),
+        ("bad", f"{mean.get('bad', 0):.1f} %", f"of the kept pixels {wrong}, R = {R:g}"),
+        ("invalid", f"{100 - mean.get('invalid', 0):.1f} %", f"of the pixels kept at R = {R:g}"),
+        (
+            "auc",
+            f"{mean.get('auc', 0):.4f}",
+            f"AUC of the confidence; a perfect one has {mean.get('auc_optimal', 0):.4f}",
+        ),
+    ]
+
+
+def _parts(found: Gathered) -> Iterator[tuple[str, Html]]:
+    yield "What ran", _what_ran(found)
+    yield "Figures", metrics_tables(found.rows, found.R) + _note() if found.rows else ""
+    yield "Error against invalid pixels", _curves(found)
+    yield "Confidence", _confidence(found)
+    thresholds = tuple(sorted({0.5, 0.7, found.R}))
+    yield "Scenes", "".join(gallery(scene.name, scene.maps, thresholds) for scene in found.scenes if scene.maps)
+    yield "Networks", networks(found)
+    yield "Configuration and versions", _configuration(found)
+
+
+def _what_ran(found: Gathered) -> Html:
+    hits = len(found.hits)
+    beside = sum(len(scene.baselines) for scene in found.scenes)
+    told = f"{hits} of {len(found.plan.steps)} products are cached. What is missing is left out below."
+    told += f" For comparison, {beside} products of other methods are cached." if beside else ""
+    notes = "".join(tag("li", text(note)) for note in found.plan.notes)
+    return (
+        tag("p", text(told)) + graph(found) + steps_table(found) + (tag("ul", notes, class_="quiet") if notes else "")
+    )
+
+
+def _note() -> Html:
+    told = (
+        "Raw error counts pixels without a disparity as wrong; the errors of kept pixels are of those that the "
+        "filtered map reports. Mask nonocc: pixels that both views see; all: also those hidden in the right view; both "
+        "only where the truth is known. Thresholds are in pixels of the image at hand."
+    )
+    return tag("p", text(told), class_="quiet")
+
+
+def _tallies(found: Gathered) -> list[tuple[str, Tally]]:
+    return [(scene.name, scene.maps.tally) for scene in found.scenes if scene.maps and scene.maps.tally]
+
+
+def _curves(found: Gathered) -> Html:
+    rows = chain.from_iterable(tally.rows(name, threshold=THRESHOLD_PX) for name, tally in _tallies(found))
+    chosen = [row for row in rows if row["R"] in _CURVE and "bad" in row]
+    if not chosen:
+        return ""
+    drawn = error_curve_figure(
+        chosen,
+        title="What a threshold on the confidence buys, and what it costs",
+        threshold=THRESHOLD_PX,
+        others=matcher_points(found.compared, len(_tallies(found))),
+    )
+    rows_told = [
+        [f"{row['R']:g}", f"{row['invalid']:.1f}", f"{row['bad']:.2f}"] for row in (mean_rows(chosen) or chosen)
+    ]
+    figures = table(
+        ["R", "invalid (%)", "error of kept (%)"], rows_told, caption="The mean of the scenes, point by point"
+    )
+    told = svg(drawn, "Error of the kept pixels against the share of invalid ones, for each threshold R")
+    return told + folded("As numbers", figures) + matchers_table(found.compared)
+
+
+def _confidence(found: Gathered) -> Html:
+    ranked = auc_table(found.compared)
+    tallies = [tally for _, tally in _tallies(found)]
+    if not tallies:
+        return ranked
+    drawn = reliability_figure(reliability(tallies), title="Is the confidence a probability?")
+    diagram = svg(drawn, "Reliability: share of right pixels against their confidence")
+    rows = measure_points(found.compared)
+    if not rows:
+        return tag("div", diagram, ranked, class_="charts")
+    dots = dots_figure(rows, "auc", title="How well does a confidence rank pixels?", width=6.5)
+    areas = svg(dots, "Area under the error curve of each measure of confidence: its mean, and a dot a scene")
+    return tag("div", diagram, areas, class_="charts") + ranked
+
+
+def _configuration(found: Gathered) -> Html:
+    config = next(iter(found.task.request("metrics").configs.values())).model_dump(mode="json")
+    about = provenance([], {})["versions"]
+    versions = table(["package", "version"], [list(pair) for pair in about.items()], caption="Versions", words=2)
+    every = [[f"{part}.{name}", json.dumps(value)] for part, fields in config.items() for name, value in fields.items()]
+    settings = table(["setting", "value"], every, caption="The configuration; null is found by itself", words=2)
+    commands = dict.fromkeys(" ".join(entry.extras.get("command", [])) for entry in found.entries.values())
+    ran = tag("p", "made by") + tag("pre", text("\n".join(command for command in commands if command)))
+    return versions + folded("All settings", settings) + ran + folded("Keys of the products", _keys(found))
+
+
+def _keys(found: Gathered) -> Html:
+    rows = [[each.step.product, each.step.scene, each.key, _made(found, each.key)] for each in found.hits if each.key]
+    rows += [
+        [product, scene.name, key, _made(found, key)]
+        for scene in found.scenes
+        for product, key in scene.baselines.items()
+    ]
+    return table(["product", "scene", "key", "made (UTC)"], rows, caption="Where each product is in the cache", words=3)
+
+
+def _made(found: Gathered, key: str) -> str:
+    return found.entries[key].created[:19].replace("T", " ")

@@ -1,0 +1,190 @@
+"""What a cache holds to look at: scenes, and of each the configurations that its maps were made with.
+
+Read off the records alone. An entry names what it was made from by the digest of its content, so going up from a
+confidence or a disparity finds everything behind it, whatever dataset or command made it.
+"""
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from semidense.cache import Entry, Store
+from semidense.pipeline.plan.steps import SPLIT
+
+_ENDS = ("confidence", "disparity")
+"""Products that a configuration ends with."""
+Chain = dict[str, Entry]
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """What one setting of everything made of a scene.
+
+    Attributes:
+        name: what sets it apart from the others of the scene, and when it was made.
+        entries: its products, by name; the truth among them, if it is known.
+        further: what was made from them, the first first: filtered maps, figures, other matchers and measures.
+    """
+
+    name: str
+    entries: Mapping[str, Entry]
+    further: tuple[Entry, ...]
+
+    @property
+    def keys(self) -> dict[str, str]:
+        """The keys of its products."""
+        return {product: entry.key for product, entry in self.entries.items()}
+
+
+@dataclass(frozen=True)
+class CatalogueScene:
+    """A scene of a cache; two pairs of images of one name are two scenes.
+
+    Attributes:
+        dataset: as the cache's records name it.
+        name: of the scene.
+        configurations: the latest first.
+    """
+
+    dataset: str
+    name: str
+    configurations: tuple[Configuration, ...]
+
+
+def catalogue(store: Store) -> tuple[CatalogueScene, ...]:
+    """Return the scenes of a cache in the order of their names.
+
+    Raises:
+        CacheUnavailable: if the cache cannot be read.
+    """
+    entries = sorted(store.entries(), key=lambda entry: entry.created)
+    records = _Records(entries)
+    scenes: dict[tuple[str, str, str], list[Chain]] = {}
+    for chain in records.chains():
+        label = next(iter(chain.values())).label
+        pair = chain["images"].digest if "images" in chain else ""
+        scenes.setdefault((label.get("dataset", ""), label.get("scene", ""), pair), []).append(chain)
+    numbered = _numbered(scenes)
+    return tuple(CatalogueScene(*numbered[place], _named(chains, records)) for place, chains in sorted(scenes.items()))
+
+
+def _numbered(places: Iterable[tuple[str, str, str]]) -> dict[tuple[str, str, str], tuple[str, str]]:
+    """Return dataset and name of each pair of images, with the start of its digest where a name is taken twice."""
+    every = list(places)
+    alike = [place[:2] for place in every]
+    return {
+        place: (place[0], place[1] if alike.count(place[:2]) == 1 else f"{place[1]} ({place[2][:6] or 'no images'})")
+        for place in every
+    }
+
+
+class _Records:
+    """The entries of a cache, by the digest of their content."""
+
+    def __init__(self, entries: Iterable[Entry]) -> None:
+        self.entries = list(entries)
+        self.by_content = {(entry.recipe.stage, entry.digest): entry for entry in self.entries}
+        self.made_from: dict[tuple[str, str], list[Entry]] = {}
+        for entry in self.entries:
+            for place in _places(entry):
+                self.made_from.setdefault(place, []).append(entry)
+        self.truths = dict(self._truths())
+
+    def _truths(self) -> Iterator[tuple[str, str]]:
+        """Yield the digests of images with those of the truth that they were compared with."""
+        for entry in self.entries:
+            for disparity, truth in _pairs(entry.recipe.inputs):
+                images = self.above({}, "disparity", disparity).get("images")
+                if images:
+                    yield images.digest, truth
+
+    def chains(self) -> Iterator[Chain]:
+        """Yield the products behind each confidence, and behind each disparity without one, the latest first."""
+        seen: set[str] = set()
+        for end in _ENDS:
+            for entry in reversed([each for each in self.entries if each.recipe.stage == end]):
+                if entry.digest in seen:
+                    continue
+                chain = self.above({}, end, entry.digest)
+                seen |= {chain[product].digest for product in _ENDS if product in chain}
+                yield self._with_truth(chain)
+
+    def above(self, found: Chain, product: str, digest: str) -> Chain:
+        """Return a product and everything it was made from that is still there; scenes trained on are left out."""
+        entry = self.by_content.get((product, digest))
+        if entry is None or product in found:
+            return found
+        found[product] = entry
+        for name, content in entry.recipe.inputs.items():
+            if isinstance(content, str):
+                self.above(found, name, content)
+        return found
+
+    def further(self, chain: Chain) -> tuple[Entry, ...]:
+        """Return what was made from the products of a scene and from nothing else but of all training scenes."""
+        known = {(product, entry.digest) for product, entry in chain.items()}
+        found: dict[str, Entry] = {}
+        waiting = [place for place in known if not self._is_learnt(place)]
+        for place in waiting:
+            for entry in self.made_from.get(place, ()):
+                own = (entry.recipe.stage, entry.digest)
+                if entry.recipe.stage in (*chain, *_ENDS) or entry.key in found:
+                    continue
+                if all(each in known or self._is_learnt(each) for each in _places(entry)):
+                    found[entry.key] = entry
+                    known.add(own)
+                    waiting.append(own)
+        return tuple(sorted(found.values(), key=lambda entry: entry.created))
+
+    def _is_learnt(self, place: tuple[str, str]) -> bool:
+        entry = self.by_content.get(place)
+        return entry is not None and entry.label.get("scene") == SPLIT
+
+    def _with_truth(self, chain: Chain) -> Chain:
+        images = chain.get("images")
+        return self.above(chain, "truth", self.truths.get(images.digest, "")) if images else chain
+
+
+def _places(entry: Entry) -> list[tuple[str, str]]:
+    """Return product and digest of each single product that an entry was made from."""
+    return [(product, content) for product, content in entry.recipe.inputs.items() if isinstance(content, str)]
+
+
+def _pairs(inputs: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield the disparities and truths that a product compares, by digest."""
+    disparity, truth = inputs.get("disparity", ()), inputs.get("truth", ())
+    if isinstance(disparity, str) and isinstance(truth, str):
+        yield disparity, truth
+    elif isinstance(disparity, list) and isinstance(truth, list):
+        yield from zip(disparity, truth, strict=False)
+
+
+def _named(chains: list[Chain], records: _Records) -> tuple[Configuration, ...]:
+    """Name each configuration by the settings that not all share, and by the time it was made."""
+    latest = sorted(chains, key=lambda chain: max(entry.created for entry in chain.values()), reverse=True)
+    settings = [dict(_settings(chain)) for chain in latest]
+    differing = [
+        name for name in dict.fromkeys(name for each in settings for name in each)
+        if len({each.get(name) for each in settings}) > 1
+    ]  # fmt: skip
+    return tuple(
+        Configuration(
+            _name(chain, {name: each[name] for name in differing if name in each}), chain, records.further(chain)
+        )
+        for chain, each in zip(latest, settings, strict=True)
+    )
+
+
+def _settings(chain: Chain) -> Iterator[tuple[str, str]]:
+    for product, entry in chain.items():
+        for name, value in entry.recipe.params.items():
+            if product not in ("images", "truth"):
+                yield f"{product}.{name}", value if isinstance(value, str) else json.dumps(value)
+
+
+def _name(chain: Chain, differing: Mapping[str, str]) -> str:
+    told = ", ".join(f"{name}={value[:24]}" for name, value in list(differing.items())[:4]) or "the only settings"
+    end = next(entry for entry in chain.values())
+    without = "" if "confidence" in chain else ", no confidence"
+    return f"{told}{without} ({end.created[:16].replace('T', ' ')}, {end.key[:6]})"

@@ -1,0 +1,67 @@
+"""The products behind a configuration: what made them, from what, when, and how to open them."""
+
+import json
+
+from semidense.cache import Entry, Store
+from semidense.pipeline.pages.html import Html, folded, table, tag, text
+from semidense.pipeline.pages.viewer.catalogue import Configuration
+from semidense.pipeline.plan.steps import ALL_PRODUCTS
+from semidense.pipeline.results.text import bytes_text
+
+
+def provenance_table(chosen: Configuration, store: Store) -> Html:
+    """Return each product of a configuration, with everything that its record tells folded below it."""
+    products = sorted(chosen.entries.items(), key=lambda item: ALL_PRODUCTS.index(item[0]))
+    rows = [
+        [
+            product,
+            bytes_text(entry.size),
+            f"{entry.seconds:.3g} s",
+            entry.created[:19].replace("T", " "),
+            entry.key[:12],
+        ]
+        for product, entry in products
+    ]
+    head = ["product", "size", "made in", "made (UTC)", "key"]
+    listed = table(head, rows, caption="The products of this configuration")
+    records = "".join(folded(product, _record(entry, store)) for product, entry in products)
+    return listed + records + (_further(chosen) if chosen.further else "")
+
+
+def _further(chosen: Configuration) -> Html:
+    rows = [
+        [
+            entry.recipe.stage,
+            ", ".join(f"{name} {_short(value)}" for name, value in entry.recipe.params.items() if name != "tiles")[:80],
+            bytes_text(entry.size),
+            f"{entry.seconds:.3g} s",
+            entry.created[:19].replace("T", " "),
+            entry.key[:12],
+        ]
+        for entry in chosen.further
+    ]
+    head = ["product", "settings", "size", "made in", "made (UTC)", "key"]
+    told = table(head, rows, caption="`pipeline cache trace KEY` tells where one comes from", words=2)
+    return folded(f"made from these: {len(rows)}", told)
+
+
+def _record(entry: Entry, store: Store) -> Html:
+    recipe = entry.recipe
+    pairs: list[tuple[str, object]] = [("key", entry.key), ("digest", entry.digest)]
+    pairs += [(f"setting {name}", _short(value)) for name, value in recipe.params.items()]
+    pairs += [(f"made from {name}", _short(value)) for name, value in recipe.inputs.items()]
+    pairs += [(f"environment: {name}", value) for name, value in recipe.environment.items()]
+    pairs += [(f"version of {name}", value) for name, value in entry.extras.get("versions", {}).items()]
+    pairs += [("command", " ".join(entry.extras.get("command", []))), ("code", f"{len(recipe.code)} modules")]
+    imports = "from semidense.pipeline.api import open_product, open_store"
+    opening = f'{imports}; open_product(open_store("{store.root}"), "{entry.key}")'
+    return table(["what", "value"], [list(pair) for pair in pairs], caption="its record", words=2) + tag(
+        "pre", text(opening)
+    )
+
+
+def _short(value: object) -> str:
+    """Return a value as text; of many, how many there are."""
+    if isinstance(value, list) and len(value) > 3:
+        return f"{len(value)} of them"
+    return value if isinstance(value, str) else json.dumps(value)

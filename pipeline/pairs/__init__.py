@@ -1,0 +1,1 @@
+"""Matching a user's own pairs."""

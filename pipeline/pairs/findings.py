@@ -1,0 +1,53 @@
+"""Say in words what a look at a pair (the product ``survey``) found wrong with it."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from semidense.datasets import DisparityRange
+from semidense.stages.disparity.survey import ENOUGH, FIELDS
+from semidense.stages.stage import Array
+
+_EQUAL = 0.99
+_NEARLY_ALL = 0.9
+_TAIL = 15
+_LEAST_OFFSET = 1.0
+"""A vertical offset below this does no harm: a patch is 11 px high."""
+
+
+def findings(survey: Mapping[str, Array], searched: DisparityRange | None) -> list[str]:
+    """Return a line for each thing that a user should look into; none for a sound pair.
+
+    Args:
+        survey: the product's arrays.
+        searched: the range of disparities that the user gave; None if it is estimated.
+    """
+    if survey["equal"][0] >= _EQUAL:
+        return [f"the two views are the same picture ({100 * survey['equal'][0]:.1f} % of their pixels are equal)"]
+    matches = dict(zip(FIELDS, survey["matches"].T, strict=True))
+    if matches["y"].size < ENOUGH:
+        return [f"only {matches['y'].size} places agree between the views: are they of the same scene, and rectified?"]
+    step = float(survey["step"][0])
+    return [*_exchanged(matches["disparity"], step, searched), *_unrectified(matches["vertical"], step)]
+
+
+def _exchanged(disparity: Array, step: float, searched: DisparityRange | None) -> Iterator[str]:
+    if np.mean(np.abs(disparity) < step) >= _NEARLY_ALL:
+        yield "the two views hardly differ: nearly all disparities are 0; are they of one camera at one place?"
+        return
+    negative = float(np.mean(disparity <= -step))
+    wanted = searched is not None and searched.minimum <= np.median(disparity)
+    if negative >= _NEARLY_ALL and not wanted:
+        yield (
+            f"left and right look exchanged: {100 * negative:.0f} % of the disparities are negative, about "
+            f"{np.median(disparity):.0f} px; give the files in the other order"
+        )
+
+
+def _unrectified(vertical: Array, step: float) -> Iterator[str]:
+    low, middle, high = np.percentile(vertical, (_TAIL, 50, 100 - _TAIL))
+    if abs(middle) >= max(_LEAST_OFFSET, step / 2) or high - low >= max(2 * _LEAST_OFFSET, 2 * step):
+        yield (
+            f"the pair looks unrectified: the right view lies {middle:+.0f} px ({low:+.0f} to {high:+.0f}, measured to "
+            f"{step:g} px) below the left one, where it should lie level; rectify it first"
+        )

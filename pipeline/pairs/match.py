@@ -1,0 +1,300 @@
+"""Match a user's own pair: ``pipeline.match``, and what comes back from it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semidense.datasets import Calibration, Dataset, DisparityRange, SceneSource, open_dataset
+from semidense.datasets.pairs.arrays import array_pair
+from semidense.datasets.pairs.pair import PairOptions, pair_spec
+from semidense.pipeline.api import Result, Task, run
+from semidense.pipeline.execution.watch import Watch
+from semidense.pipeline.pairs.findings import findings
+from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.plan import Made
+from semidense.pipeline.plan.steps import SPLIT
+from semidense.stages.disparity import depth as geometry
+from semidense.stages.evaluation.calibration.table import Outcome, Table, outcome
+
+Unit = Literal["mm", "cm", "m"]
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What to do with the raw map; by default it is filtered at R = 0.9 and nothing else.
+
+    Attributes:
+        R: least confidence that is kept; None for the configuration's.
+        density: share of the image's pixels to keep instead, the most confident, in (0, 1].
+        max_error: share of wrong pixels to expect among the kept instead, in (0, 1), by the pair's own confidences and
+            how often such were right in training scenes that the networks had not seen.
+        calibrated: take and give the confidence as the probability that was measured there.
+        left_right: drop what the right view's map contradicts by more than ``tolerance`` px.
+        tolerance: px.
+        subpixel: move each disparity to the parabola's lowest point.
+        fill: fill the holes with the background; the map is dense then, and partly guessed.
+        right_view: make the right view's raw map too.
+    """
+
+    R: float | None = None
+    density: float | None = None
+    max_error: float | None = None
+    calibrated: bool = False
+    left_right: bool = False
+    tolerance: float = 1.0
+    subpixel: bool = False
+    fill: bool = False
+    right_view: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what contradicts itself."""
+        given = [name for name in ("R", "density", "max_error") if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise UsageError(f"{' and '.join(given)} both say how much to keep; give one of them")
+
+    @property
+    def product(self) -> str:
+        """The product that the wishes come down to."""
+        return "filled" if self.fill else "refined" if self.left_right or self.subpixel else "semidense"
+
+    @property
+    def confidence(self) -> str:
+        """The product that the confidence is taken from."""
+        return "calibrated_confidence" if self.calibrated else "confidence"
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The same as settings of the configuration."""
+        given = {f"semidense.{name}": getattr(self, name) for name in ("R", "density", "max_error")}
+        if self.calibrated:
+            given |= {"semidense.calibrated": True}
+        if self.left_right:
+            given |= {"refined.left_right": True, "refined.tolerance": self.tolerance}
+        if self.subpixel:
+            given |= {"refined.subpixel": True}
+        return tuple(f"{name}={str(value).lower()}" for name, value in given.items() if value is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """A matched pair. Everything is of the left view unless it says otherwise.
+
+    Attributes:
+        scene: where it comes from.
+        wishes: what was asked for.
+        result: the run that made the map.
+        others: the runs that made the look at the pair and, if asked for, the right view's map.
+    """
+
+    scene: SceneSource
+    wishes: Wishes
+    result: Result
+    others: tuple[Result, ...]
+
+    @cached_property
+    def disparity(self) -> NDArray[np.float32]:
+        """(y, x) float32, px, ``x_right = x_left - d``; NaN where there is none."""
+        return self._array(self.wishes.product, "disparity")
+
+    @cached_property
+    def raw(self) -> NDArray[np.float32]:
+        """(y, x) float32, px: the winner-take-all map before anything was dropped."""
+        return self._array("disparity", "disparity")
+
+    @cached_property
+    def confidence(self) -> NDArray[np.float32]:
+        """(y, x) float32 in [0, 1]: how sure the evaluation-Net is of ``raw``; calibrated, if that was asked for."""
+        return self._array(self.wishes.confidence, "confidence")
+
+    @cached_property
+    def guessed(self) -> NDArray[np.bool_]:
+        """(y, x) bool: pixels whose disparity was filled in."""
+        return self._array("filled", "guessed") if self.wishes.fill else np.zeros(self.scene.size, bool)
+
+    @cached_property
+    def right_disparity(self) -> NDArray[np.float32]:
+        """(y, x) float32, px, right view, ``x_left = x_right + d``: its raw map.
+
+        Raises:
+            UsageError: if it was not asked for.
+        """
+        return self._array("right_disparity", "disparity")
+
+    @cached_property
+    def image(self) -> NDArray[Any]:
+        """(y, x, band) uint8 or uint16: the left view."""
+        return self._array("images", "left")
+
+    @cached_property
+    def depth(self) -> NDArray[np.float32]:
+        """(y, x) float32, metres; NaN where there is no disparity, or it means infinity.
+
+        Raises:
+            UsageError: if the pair has no calibration.
+        """
+        known = self.calibration
+        return geometry.depth(self.disparity, known.focal, known.baseline / 1000, known.doffs)
+
+    def points(self) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        """Return the points in space, (point, 3) float32 metres (right, up, towards the viewer), and their colours.
+
+        Without a principal point in the calibration, the image's centre stands for it.
+
+        Raises:
+            UsageError: if the pair has no calibration.
+        """
+        rows, columns = self.scene.size
+        centre = self.calibration.centre or ((columns - 1) / 2, (rows - 1) / 2)
+        colours = self.image[np.isfinite(self.depth)]
+        if colours.dtype == np.uint16:
+            colours = (colours // 257).astype(np.uint8)
+        return geometry.points(self.depth, self.calibration.focal, centre), np.broadcast_to(colours, (len(colours), 3))
+
+    @property
+    def calibration(self) -> Calibration:
+        """What depth needs.
+
+        Raises:
+            UsageError: if the pair has none.
+        """
+        if self.scene.calibration is None:
+            raise UsageError(f"{self.scene.name}: depth needs a calibration; give calib.txt, OpenCV's or ROS's files")
+        return self.scene.calibration
+
+    @property
+    def R(self) -> float:  # noqa: N802 - the paper's name
+        """The least confidence that was kept."""
+        return float(self._array("semidense", "R")[0])
+
+    @cached_property
+    def basis(self) -> Outcome | None:
+        """What the wanted error came to in training scenes; None if no error was asked for."""
+        if self.wishes.max_error is None:
+            return None
+        calibration = self.result.store.read(self.made("calibration").key)
+        return outcome(Table.of(calibration), calibration["log_odds"], self.wishes.max_error)
+
+    @property
+    def expected_error(self) -> float | None:
+        """The share of wrong pixels to expect among those that the wanted error keeps; None if there is none.
+
+        Raises:
+            UsageError: if neither an error nor calibrated confidences were asked for.
+        """
+        kept = np.isfinite(self._array("semidense", "disparity"))
+        right = self._array("calibrated_confidence", "confidence")[kept]
+        return float(np.mean(1 - right, dtype=np.float64)) if right.size else None
+
+    @property
+    def density(self) -> float:
+        """The share of the image's pixels that have a disparity."""
+        return float(np.isfinite(self.disparity).mean())
+
+    @property
+    def disparities(self) -> DisparityRange:
+        """The range that was searched."""
+        settings = self.made("costvolume").step.settings
+        return DisparityRange(settings["d_min"], settings["d_max"])
+
+    @cached_property
+    def survey(self) -> dict[str, NDArray[Any]]:
+        """The arrays of the look at the pair."""
+        return self.result.store.read(self.made("survey").key)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What looks wrong with the pair: exchanged, unrectified or identical views."""
+        return findings(self.survey, None if self.scene.open_ends else self.disparities)
+
+    def made(self, product: str) -> Made:
+        """Return the result of one of the pair's products.
+
+        Raises:
+            UsageError: if it was not made.
+        """
+        for result in (self.result, *self.others):
+            for each in result.made.values():
+                if each.step.product == product and each.step.scene in (self.scene.name, SPLIT):
+                    return each
+        raise UsageError(f"{product} of {self.scene.name} was not asked for")
+
+    def _array(self, product: str, name: str) -> NDArray[Any]:
+        return np.asarray(self.result.store.arrays(self.made(product).key)[name][...])
+
+
+def match(
+    left: object,
+    right: object,
+    *,
+    d_min: int | None = None,
+    d_max: int | None = None,
+    calib: str | PathLike[str] | Sequence[str | PathLike[str]] = (),
+    unit: Unit | None = None,
+    settings: Sequence[str] = (),
+    cache: Path | str | None = None,
+    watch: Watch | None = None,
+    workers: int | None = None,
+    **wishes: Any,  # noqa: ANN401 - those of Wishes
+) -> Match:
+    """Match one rectified pair, reusing all that is cached.
+
+    Args:
+        left: a file, or (y, x), (y, x, 3) RGB, uint8 or uint16: the reference view.
+        right: the other view, of the same size.
+        d_min: smallest disparity to search, px; None for the calibration's, else an estimate.
+        d_max: largest one.
+        calib: a Middlebury ``calib.txt``, an OpenCV file, or a left and a right ROS file.
+        unit: of an OpenCV calibration.
+        settings: ``section.field=value`` of the configuration.
+        cache: the cache's folder.
+        watch: told how it goes on.
+        workers: threads; None for one a core.
+        **wishes: the attributes of `Wishes`, such as ``R=0.8``, ``density=0.8`` or ``subpixel=True``.
+
+    Raises:
+        UsageError, DatasetError, CacheError, StageError: what the user can mend, in one line.
+    """
+    files = [calib] if isinstance(calib, str | PathLike) else calib
+    options = PairOptions(tuple(fspath(file) for file in files), unit, d_min, d_max)
+    task = Task(_dataset(left, right, options), settings=tuple(settings), cache=cache)
+    found = match_all(task, Wishes(**wishes), watch=watch, workers=workers)
+    if len(found) != 1:
+        raise UsageError(f"{left} and {right} are {len(found)} pairs; match one at a time, or use `pipeline match`")
+    return found[0]
+
+
+def _dataset(left: object, right: object, options: PairOptions) -> Dataset:
+    if isinstance(left, str | PathLike) and isinstance(right, str | PathLike):
+        return open_dataset(pair_spec([fspath(left), fspath(right)], options))
+    return array_pair(left, right, options)
+
+
+def look(task: Task, watch: Watch | None = None, workers: int | None = None) -> Result:
+    """Make the product ``survey`` of every pair."""
+    return run(task, "survey", watch=watch, workers=workers)
+
+
+def match_all(
+    task: Task,
+    wishes: Wishes,
+    *,
+    watch: Watch | None = None,
+    scheduler: str | None = None,
+    workers: int | None = None,
+) -> list[Match]:
+    """Match every pair of a dataset; as `match`, with a ``Task`` for what all verbs share."""
+    task = replace(task, settings=(*task.settings, *wishes.settings))
+    dataset = open_dataset(task.dataset) if isinstance(task.dataset, str) else task.dataset
+    dataset = dataset.select(task.scenes) if task.scenes else dataset
+    task = replace(task, dataset=dataset)
+    others = [look(task, watch, workers)]
+    result = run(task, wishes.product, watch=watch, scheduler=scheduler, workers=workers)
+    if wishes.right_view:
+        others.append(run(task, "right_disparity", watch=watch, scheduler=scheduler, workers=workers))
+    return [Match(scene, wishes, result, tuple(others)) for scene in dataset.scenes]

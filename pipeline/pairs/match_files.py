@@ -1,0 +1,241 @@
+"""Write what a matched pair gives into a folder: all of it, or nothing.
+
+::
+
+    FOLDER/
+        summary.json            parameters, versions, timings, density, warnings, and what each file holds
+        disparity.*             the map: .pfm (none: infinity), .png (KITTI's 16 bits, none: 0), .tif, .npy (none: NaN)
+        disparity-colour.png    the same with a legend
+        confidence.*            the same formats, and confidence-colour.png
+        depth.*                 with a calibration: metres (16-bit PNG: millimetres)
+        points.ply              with a calibration: the coloured points, right side up
+        right_disparity.*       if asked for: the right view's raw map
+        guessed.png             if holes were filled: white where
+        survey.png              if something looks wrong with the pair: where
+
+The files are made in a hidden folder beside their place and moved when all of them are there. Those of an earlier match
+that this one does not write are deleted.
+"""
+
+import json
+import os
+import secrets
+import shutil
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from semidense.datasets.formats.ply import write_ply
+from semidense.pipeline.execution.tasks import provenance
+from semidense.pipeline.files.file_names import safe_names
+from semidense.pipeline.files.map_files import (
+    CONFIDENCE,
+    DEPTH,
+    DISPARITY,
+    ENDINGS,
+    FORMATS,
+    RIGHT_DISPARITY,
+    Png16Error,
+    Quantity,
+    write_map,
+)
+from semidense.pipeline.files.writing import explaining, writable_folder, write_rgb
+from semidense.pipeline.pairs.match import Match
+from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.results.opening import open_product
+from semidense.stages.evaluation.calibration.table import told
+
+_SUMMARY = "summary.json"
+_QUANTITIES = (DISPARITY, CONFIDENCE, DEPTH, RIGHT_DISPARITY)
+_PICTURES = {"disparity-colour.png", "confidence-colour.png", "guessed.png", "survey.png", "points.ply"}
+"""What is written beside the maps."""
+_POINTS = "x right, y up, z towards the viewer; metres, from the left camera"
+
+
+def save_all(matches: Sequence[Match], folder: Path, formats: Sequence[str] = FORMATS) -> list[dict[str, Any]]:
+    """Write pairs: a single one into the folder itself, several into a folder each, named by the pair.
+
+    Returns:
+        The summaries, as ``summary.json`` holds them.
+
+    Raises:
+        UsageError: if the folder cannot be written; nothing of a pair that could not be written whole is left.
+        CacheError: if a result is no longer in the cache.
+    """
+    names = safe_names(match.scene.name for match in matches)
+    places = [folder if len(matches) == 1 else folder / names[match.scene.name] for match in matches]
+    return [save(match, place, formats) for match, place in zip(matches, places, strict=True)]
+
+
+def require_place(folder: Path) -> None:
+    """Refuse a folder that cannot be written, without making it: matching takes long.
+
+    Raises:
+        UsageError: if it, or the nearest folder above it that there is, is a file or closed to this user.
+    """
+    place = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+    if not place.is_dir():
+        raise UsageError(f"{folder}: cannot be written ({place} is a file); name another place")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise UsageError(f"{folder}: cannot be written (no permission in {place}); name another place")
+
+
+def save(match: Match, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Any]:
+    """Write one pair; as `save_all`."""
+    writable_folder(folder)
+    with explaining(folder), _draft(folder) as draft:
+        writer = _Writer(match, draft, formats)
+        writer.write_maps()
+        writer.write_pictures()
+        writer.write_points()
+        summary = writer.write_summary()
+        _publish(draft, folder)
+    return summary | {"folder": str(folder)}
+
+
+@contextmanager
+def _draft(folder: Path) -> Iterator[Path]:
+    """Make a hidden folder inside another one, which is gone in the end."""
+    draft = folder / f".match-{secrets.token_hex(4)}"
+    draft.mkdir()
+    try:
+        yield draft
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _publish(draft: Path, folder: Path) -> None:
+    """Move the files to their place, the summary last; what only an earlier match wrote goes.
+
+    So a folder with a summary holds what it names, of one match; without one, a match was cut short.
+    """
+    earlier, names = _written_before(folder), {path.name for path in draft.iterdir()} - {_SUMMARY}
+    (folder / _SUMMARY).unlink(missing_ok=True)
+    for name in sorted(names):
+        (draft / name).replace(folder / name)
+    for name in sorted(earlier - names):
+        (folder / name).unlink(missing_ok=True)
+    (draft / _SUMMARY).replace(folder / _SUMMARY)
+
+
+def _written_before(folder: Path) -> set[str]:
+    """Return the files that an earlier match wrote, as its summary has it; only names that a match writes count."""
+    maps = {f"{each.name}.{ending}" for each in _QUANTITIES for ending in ENDINGS.values()}
+    try:
+        listed = json.loads((folder / _SUMMARY).read_text())["files"]
+        return {each["file"] for each in listed} & (maps | _PICTURES)
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return set()
+
+
+@dataclass
+class _Writer:
+    """The files of one pair, written so far."""
+
+    match: Match
+    folder: Path
+    formats: Sequence[str]
+    files: list[dict[str, str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def write_maps(self) -> None:
+        """Write every map of numbers."""
+        self._write(DISPARITY, self.match.disparity)
+        self._write(CONFIDENCE, self.match.confidence)
+        if self.match.scene.calibration:
+            self._write(DEPTH, self.match.depth)
+        if self.match.wishes.right_view:
+            self._write(RIGHT_DISPARITY, self.match.right_disparity)
+
+    def _write(self, quantity: Quantity, values: np.ndarray[Any, np.dtype[np.float32]]) -> None:
+        for kind in self.formats:
+            try:
+                name, about = write_map(values, quantity, kind, self.folder)
+            except Png16Error as error:
+                self.notes.append(f"{quantity.name}.png was not written: {str(error).partition(': ')[2]}")
+            else:
+                self.files.append({"file": name, **about})
+
+    def write_pictures(self) -> None:
+        """Write what is for the eye."""
+        self._draw(self.match.wishes.product, "disparity-colour.png")
+        self._draw(self.match.wishes.confidence, "confidence-colour.png")
+        if self.match.wishes.fill:
+            write_rgb(
+                self.match.guessed.astype(np.uint8)[..., np.newaxis].repeat(3, axis=2) * 255,
+                self.folder / "guessed.png",
+            )
+            self.files.append(
+                {"file": "guessed.png", "quantity": "white: filled in, a guess", "reference view": "left"}
+            )
+        if self.match.warnings:
+            self._draw("survey", "survey.png")
+
+    def _draw(self, product: str, name: str) -> None:
+        from semidense.pipeline.figures.figure import figure, product_title
+        from semidense.pipeline.files.writing import save_png
+
+        dataset = open_product(self.match.result.store, self.match.made(product).key)
+        save_png(figure(product, dataset, title=product_title(dataset)), self.folder / name)
+        self.files.append({"file": name, "quantity": f"picture of {product}, with a legend", "reference view": "left"})
+
+    def write_points(self) -> None:
+        """Write the cloud, if there is a calibration."""
+        if self.match.scene.calibration:
+            write_ply(self.folder / "points.ply", *self.match.points(), [_POINTS])
+            self.files.append(
+                {"file": "points.ply", "quantity": f"points: {_POINTS}", "unit": "m", "reference view": "left"}
+            )
+
+    def write_summary(self) -> dict[str, Any]:
+        """Write and return the summary."""
+        about = summary(self.match) | {"notes": self.notes, "files": self.files}
+        (self.folder / _SUMMARY).write_text(json.dumps(about, indent=2, allow_nan=False) + "\n")
+        return about
+
+
+def _basis(match: Match) -> dict[str, Any]:
+    """Return where R comes from; for a wanted error, what to expect and what it came to in training scenes."""
+    if not match.basis:
+        return {
+            "R_from": "from the pair's own confidences, for the density asked for" if match.wishes.density else "as set"
+        }
+    expected = match.expected_error
+    words = "no pixel is sure enough for that error" if expected is None else f"R = {told(match.R)}"
+    return {
+        "R_from": "for the error asked for",
+        "R_basis": f"{words}; {match.basis.words}",
+        "expected_error_percent": None if expected is None else 100 * expected,
+    }
+
+
+def summary(match: Match) -> dict[str, Any]:
+    """Return what is to be said of a matched pair, ready for JSON."""
+    steps = [each for each in match.result.made.values() if each.step.scene == match.scene.name]
+    known = match.scene.calibration
+    wishes = match.wishes
+    return {
+        "pair": match.scene.name,
+        "left": str(match.scene.files.get("left", "an array")),
+        "right": str(match.scene.files.get("right", "an array")),
+        "rows": match.scene.size[0],
+        "columns": match.scene.size[1],
+        "reference_view": "left",
+        "disparities": asdict(match.disparities) | {"estimated": list(match.scene.open_ends)},
+        "R": match.R,
+        **_basis(match),
+        "wishes": asdict(wishes),
+        "density_percent": 100 * match.density,
+        "guessed_percent": 100 * float(match.guessed.mean()),
+        "calibration_mm_px": asdict(known) if known else None,
+        "warnings": match.warnings,
+        "seconds": {each.step.product: each.seconds for each in steps},
+        "reused": [each.step.product for each in steps if each.reused],
+        "settings": {each.step.product: dict(each.step.settings) for each in steps},
+        "keys": {each.step.product: each.key for each in steps},
+    } | {name: value for name, value in provenance(sys.argv, {}).items() if name != "configuration"}

@@ -1,0 +1,79 @@
+"""Products that are read, not computed: the images and the truth of a scene.
+
+They are cached like all others, so that every stage below reads from the cache alone, wherever it runs,
+and a source file that changes makes stale exactly what depends on it. Their functions are given the
+``SceneSource`` to read where those of the stages are given their settings.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semidense.datasets.occlusion import left_right_check
+from semidense.datasets.scene import SceneSource
+from semidense.stages.stage import Array, Inputs, Output, Stage, StageError
+
+MASK_KINDS = ("published", "left-right check", "warped truth", "exact", "non-occluded truth", "none")
+"""Where a scene's non-occlusion mask comes from, in the order of the product's ``mask_kind``."""
+
+IMAGES = Stage(
+    product="images",
+    inputs=(),
+    outputs=(
+        Output("left", ("y", "x", "band"), None, "1", "left view, the reference; 8 or 16 bits as in the file"),
+        Output("right", ("y", "x", "band"), None, "1", "right view"),
+        Output("moments", ("view", "moment"), "float64", "1", "mean and standard deviation of each view's 8-bit gray"),
+    ),
+    compute="semidense.pipeline.plan.images_and_truth:read_images",
+)
+TRUTH = Stage(
+    product="truth",
+    inputs=(),
+    outputs=(
+        Output("disparity", ("y", "x"), "float32", "px", "true disparity of the left view; NaN: unknown"),
+        Output("nonocc", ("y", "x"), "bool", "1", "seen in both views, truth known"),
+        Output("right_disparity", ("y", "x"), "float32", "px", "true disparity of the right view; NaN: unknown"),
+        Output("right_nonocc", ("y", "x"), "bool", "1", "the same of the right view; all false: unknown"),
+        Output("range", ("bound",), "int32", "px", "smallest and largest disparity of the scene"),
+        Output("mask_kind", ("kind",), "int8", "1", "where nonocc comes from: index into " + ", ".join(MASK_KINDS)),
+    ),
+    compute="semidense.pipeline.plan.images_and_truth:read_truth",
+)
+
+
+def read_images(scene: SceneSource, _: Inputs) -> dict[str, Array]:
+    """Return both views as (y, x, band), and the gray moments of each over the whole view."""
+    from semidense.stages.transforms.gray import gray_moments, to_gray
+
+    views = scene.load_images()
+    left, right = (view.reshape(*view.shape[:2], -1) for view in views)
+    return {"left": left, "right": right, "moments": np.array([gray_moments(to_gray(view)) for view in views])}
+
+
+def read_truth(scene: SceneSource, _: Inputs) -> dict[str, Array]:
+    """Return the ground truth of both views and the disparity range.
+
+    Raises:
+        StageError: if the scene has none.
+    """
+    found = scene.load_truth()
+    if found is None:
+        raise StageError(f"{scene.name} has no ground truth")
+    right, right_nonocc = _right_truth(found.disparity, found.right)
+    return {
+        "disparity": found.disparity,
+        "nonocc": found.nonocc,
+        "right_disparity": right,
+        "right_nonocc": right_nonocc,
+        "range": np.array([scene.disparities.minimum, scene.disparities.maximum], np.int32),
+        "mask_kind": np.array([MASK_KINDS.index(found.mask)], np.int8),
+    }
+
+
+def _right_truth(
+    left: NDArray[np.float32], right: NDArray[np.float32] | None
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Return the right view's truth and what of it both views see: nothing where none is published."""
+    if right is None:
+        return np.full_like(left, np.nan), np.zeros(left.shape, bool)
+    # Mirrored and exchanged, the right view is the left one of a rectified pair.
+    return right, left_right_check(right[:, ::-1], left[:, ::-1])[:, ::-1]

@@ -1,0 +1,177 @@
+"""The plan of a run: every step with its key and its state, before anything is computed.
+
+``run --dry-run``, ``status`` and ``explain`` print this very object; ``run`` executes it.
+A key needs the content of what the step is made from, so below a step that is still to be made the
+keys are open: such a step will be made too, unless what is above it comes out unchanged (then it is
+a hit, and saved).
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from semidense.cache import ABSENT, Change, Entry, Recipe, Store, differences
+from semidense.pipeline.plan.causes import PENDING, Causes
+from semidense.pipeline.plan.config import nearest
+from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.steps import ALL_PRODUCTS, Graph, Request, Step, build
+
+State = Literal["hit", "made", "stale", "missing"]
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A step and what the cache has for it.
+
+    Attributes:
+        step: the step.
+        state: ``hit``: it is there; ``stale``: it was made from something else before, see
+            ``changed``; ``missing``: it was never made; ``made``: an execution has made it.
+        key: of its result; None while it is open.
+        digest: of its content; None unless it is there.
+        changed: what differs from the nearest earlier result of the same product and scene.
+        causes: what that comes from, a line each: the setting, function, file or weights that changed.
+        damage: what is wrong with an entry that is there and cannot be used.
+        seconds: what making it took, if it is there.
+    """
+
+    step: Step
+    state: State
+    key: str | None = None
+    digest: str | None = None
+    changed: tuple[Change, ...] = ()
+    damage: str | None = None
+    seconds: float | None = None
+    causes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Made:
+    """A product that is there: its step, the key and digest of its entry, and whether it was there before."""
+
+    step: Step
+    key: str
+    digest: str
+    seconds: float
+    reused: bool
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The steps of a run in order, and what was asked for.
+
+    Attributes:
+        steps: in the order in which they can be made.
+        targets: ids of the steps that were asked for, each with its variant.
+        notes: what a person should know.
+        forced: products that are made again even if they are there.
+    """
+
+    steps: tuple[Planned, ...]
+    targets: tuple[tuple[str, str], ...]
+    notes: tuple[str, ...] = ()
+    forced: frozenset[str] = frozenset()
+
+    def todo(self) -> tuple[Planned, ...]:
+        """Return the steps that are to be made."""
+        return tuple(planned for planned in self.steps if planned.state != "hit")
+
+
+def make_plan(request: Request, store: Store, forced: Iterable[str] = ()) -> Plan:
+    """Return the plan of a request: changes nothing, computes nothing.
+
+    Args:
+        request: what is to be made.
+        store: the cache.
+        forced: products to make again.
+
+    Raises:
+        UsageError, DatasetError, StageError: if the request cannot be carried out.
+        CacheUnavailable: if the cache cannot be read.
+    """
+    unknown = sorted(set(forced) - set(ALL_PRODUCTS))
+    if unknown:
+        raise UsageError(f"no product {unknown[0]!r} to force; {nearest(unknown[0], ALL_PRODUCTS)}")
+    return plan_graph(build(request), store, forced)
+
+
+def plan_graph(graph: Graph, store: Store, forced: Iterable[str] = ()) -> Plan:
+    """Return the plan of steps that are known already; as ``make_plan`` otherwise."""
+    planner = _Planner(store, frozenset(forced))
+    planned = tuple(planner.look_at(step) for step in graph.steps.values())
+    return Plan(planned, tuple(graph.targets), tuple(graph.notes), planner.forced)
+
+
+class _Planner:
+    """Decides each step's state, in order; keeps what it learnt of the steps before."""
+
+    def __init__(self, store: Store, forced: frozenset[str]) -> None:
+        self.store = store
+        self.forced = forced
+        self.digests: dict[str, str] = {}
+        self._history: dict[tuple[tuple[str, str], ...], list[Entry]] | None = None
+        self._reasons: Causes | None = None
+        self._causes: dict[str, tuple[str, ...]] = {}
+
+    def look_at(self, step: Step) -> Planned:
+        """Return the step with its state."""
+        open_inputs = {
+            product: ids for product, ids in step.inputs.items() if not all(each in self.digests for each in ids)
+        }
+        if open_inputs:
+            return self._not_there(step, None, self._pending(step, open_inputs))
+        recipe = step.recipe(self.digests)
+        entry = self.store.find(recipe.key)
+        damage = self.store.check(recipe.key) if entry else None
+        if entry is None or damage or step.product in self.forced:
+            changes = (Change("forced", ABSENT, step.product),) if entry and not damage else None
+            return self._not_there(step, recipe, changes or self._changes(step, recipe), damage)
+        self.digests[step.id] = entry.digest
+        return Planned(step, "hit", recipe.key, entry.digest, seconds=entry.seconds)
+
+    def _not_there(
+        self, step: Step, recipe: Recipe | None, changed: tuple[Change, ...], damage: str | None = None
+    ) -> Planned:
+        state: State = "stale" if self._earlier(step) else "missing"
+        if damage:
+            damage = damage.removeprefix(f"the entry {recipe.key if recipe else ''} is damaged: ")
+            causes: tuple[str, ...] = (f"{step.product} is damaged: {damage}",)
+        else:
+            causes = self._reasons.of(step, changed, self._causes) if self._reasons else ()
+        self._causes[step.id] = causes
+        return Planned(step, state, recipe.key if recipe else None, changed=changed, damage=damage, causes=causes)
+
+    def _changes(self, step: Step, recipe: Recipe) -> tuple[Change, ...]:
+        """Return how a recipe differs from the nearest earlier one of the same label."""
+        candidates: list[list[Change]] = [differences(entry.recipe, recipe) for entry in self._earlier(step)]
+        return _fewest(candidates)
+
+    def _pending(self, step: Step, open_inputs: Mapping[str, tuple[str, ...]]) -> tuple[Change, ...]:
+        """Return the step's own changes, and the inputs that are to be made before it."""
+        pending = tuple(Change(f"inputs.{product}", ABSENT, PENDING) for product in open_inputs)
+        own: list[list[Change]] = [
+            [change for change in differences(entry.recipe, _own(step, entry.recipe)) if change.field != "inputs"]
+            for entry in self._earlier(step)
+        ]
+        return (*_fewest(own), *pending)
+
+    def _earlier(self, step: Step) -> list[Entry]:
+        """Return the results of the same label, newest first; the cache is read once for all steps."""
+        if self._history is None:
+            self._history = {}
+            entries = sorted(self.store.entries(), key=lambda entry: entry.created, reverse=True)
+            self._reasons = Causes(self.store, entries)
+            for entry in entries:
+                self._history.setdefault(tuple(sorted(entry.label.items())), []).append(entry)
+        return self._history.get(tuple(sorted(step.label.items())), [])
+
+
+def _fewest(candidates: list[list[Change]]) -> tuple[Change, ...]:
+    """Return the shortest list of changes; of equal ones the first, which is the newest result's."""
+    shortest: list[Change] = min(candidates, key=len, default=[])
+    return tuple(shortest)
+
+
+def _own(step: Step, earlier: Recipe) -> Recipe:
+    """Return the step's recipe as if its inputs were those of an earlier result."""
+    return Recipe(step.product, step.code, step.settings, earlier.inputs, step.environment)

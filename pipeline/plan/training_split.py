@@ -1,0 +1,90 @@
+"""The scenes to train on; and their folds, so that each can be scored by networks that have not seen it."""
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+from semidense.datasets import Dataset, SceneSource
+from semidense.pipeline.plan.config import Config
+from semidense.pipeline.plan.errors import UsageError
+
+_Scene = TypeVar("_Scene")
+
+
+def training_scenes(dataset: Dataset) -> tuple[SceneSource, ...]:
+    """Return the scenes of a dataset that may be trained on and have a truth.
+
+    Raises:
+        UsageError: if there is none.
+    """
+    scenes = tuple(scene for scene in dataset.scenes if scene.split == "train" and scene.has_truth)
+    if not scenes:
+        raise UsageError(
+            f"{dataset.spec} has no training scene: name a dataset that has some with "
+            "--set training.dataset=middlebury:DIR"
+        )
+    return scenes
+
+
+def with_folds(config: Config, names: Sequence[str]) -> Config:
+    """Return the configuration of the folds: which scenes are in which, and the schedule of their networks.
+
+    All networks of a fold are trained, since those that come with the package have seen its scenes, for so many steps
+    that they see a scene as often as the networks of all scenes do.
+
+    Raises:
+        UsageError: if the folds that are set do not fit the scenes, or there are fewer scenes than folds.
+    """
+    params = config.calibration
+    folds = params.fold_of_scene or assign_folds(names, params.folds)
+    if len(folds) != len(names) or len(set(folds)) < 2:
+        raise UsageError(
+            f"calibration.fold_of_scene names {len(set(folds))} folds of {len(folds)} scenes; there are {len(names)} "
+            "training scenes, and it takes two folds at least"
+        )
+    share = 1 - 1 / len(set(folds))
+    nets = {name: getattr(config, name) for name in ("matching_net", "descriptor_net", "evaluation_net")}
+    update = {name: net.model_copy(update={"steps": max(1, round(net.steps * share))}) for name, net in nets.items()}
+    update["calibration"] = params.model_copy(update={"fold_of_scene": folds})
+    update["training"] = config.training.model_copy(update={"shipped": ()})
+    return config.model_copy(update=update)
+
+
+def outside(scenes: Sequence[_Scene], folds: Sequence[int], fold: int) -> tuple[_Scene, ...]:
+    """Return the scenes that are not of a fold.
+
+    >>> outside("abc", folds=(0, 1, 1), fold=0)
+    ('b', 'c')
+    """
+    return tuple(scene for scene, other in zip(scenes, folds, strict=True) if other != fold)
+
+
+def assign_folds(names: Sequence[str], folds: int) -> tuple[int, ...]:
+    """Return the fold of each scene: the smallest one so far, siblings together.
+
+    Raises:
+        UsageError: if there are fewer scenes than folds.
+
+    >>> assign_folds(["Art", "Cloth1", "Cloth2", "Dolls"], folds=2)
+    (0, 1, 1, 0)
+    """
+    if len(names) < folds:
+        raise UsageError(f"{folds} folds take {folds} scenes at least, one each, and there are {len(names)}")
+    each = families(names, folds)
+    fold_of: dict[str, int] = {}
+    sizes = [0] * folds
+    for family in each:
+        fold = fold_of.setdefault(family, sizes.index(min(sizes)))
+        sizes[fold] += 1
+    return tuple(fold_of[family] for family in each)
+
+
+def families(names: Sequence[str], fewest: int = 2) -> list[str]:
+    """Return what each name shares with its siblings: such as ``Cloth1`` and ``Cloth2``, they show much the same.
+
+    With fewer families than ``fewest`` each goes its own way.
+
+    >>> families(["Art", "Cloth1", "Cloth2"])
+    ['Art', 'Cloth', 'Cloth']
+    """
+    shared = [name.rstrip("0123456789") for name in names]
+    return shared if len(set(shared)) >= fewest else list(names)

@@ -1,0 +1,44 @@
+"""Open a cached product as people want to look at it: with coordinates, units and names."""
+
+import math
+from typing import TYPE_CHECKING
+
+from semidense.cache import Store
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def open_product(store: Store, key: str) -> "xr.Dataset":
+    """Return a cached product as a lazy dataset.
+
+    Rows and columns get coordinates in px. Beside ``cost``, the log-odds of a mismatch, a cost volume
+    offers its ``probability``. Each figure of ``metrics`` is an array of its own.
+
+    Raises:
+        CacheError: if the entry is missing or damaged.
+    """
+    dataset = store.open(key)
+    for dim in ("y", "x"):
+        if dim in dataset.sizes:
+            dataset = dataset.assign_coords({dim: (dim, range(dataset.sizes[dim]), {"units": "px"})})
+    if "cost" in dataset:
+        cost = dataset["cost"].astype("float32")
+        probability = 1 / (1 + math.e ** (-cost))
+        dataset["probability"] = probability.assign_attrs(units="1", long_name="probability of a mismatch")
+    return _with_named_figures(dataset) if "figures" in dataset else dataset
+
+
+def _with_named_figures(dataset: "xr.Dataset") -> "xr.Dataset":
+    """Return the product ``metrics`` with an array (mask, threshold) for each figure."""
+    from semidense.stages.metrics.stage import FIGURES, MASKS, THRESHOLDS, by_name
+
+    named = {
+        name: (("mask", "threshold"), values, {"units": FIGURES[name][1], "long_name": FIGURES[name][2]})
+        for name, values in by_name(dataset["figures"].values).items()
+    }
+    return (
+        dataset.drop_vars("figures")
+        .assign(named)
+        .assign_coords(mask=list(MASKS), threshold=("threshold", list(THRESHOLDS), {"units": "px"}))
+    )

@@ -1,0 +1,1 @@
+"""How loops and networks run on this CPU: compiled loops, number formats, threads, memory."""

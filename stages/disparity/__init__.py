@@ -1,0 +1,1 @@
+"""Disparity maps: the winner of the costs, the right view, refinement, filling, depth."""

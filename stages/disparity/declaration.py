@@ -1,0 +1,73 @@
+"""Declare the disparity maps of both views and what follows them: refinement and filling. Loads no numba."""
+
+from pydantic import Field
+
+from semidense.stages.stage import Output, Params, Stage
+
+
+class DisparityParams(Params):
+    """How a disparity is read off the cost volume."""
+
+    subpixel: bool = Field(default=False, description="refine by a parabola through three costs; off in the paper")
+
+
+DISPARITY = Stage(
+    product="disparity",
+    inputs=("costvolume",),
+    outputs=(Output("disparity", ("y", "x"), "float32", "px", "raw disparity of the left view; NaN: no valid cost"),),
+    compute="semidense.stages.disparity.winner_takes_all:compute_disparity",
+    params=DisparityParams,
+    tile_rows=32,
+)
+"""The raw disparity. ``costvolume`` has ``cost`` (y, x, d) float16 and its coordinate ``d`` (d,) int16, px. A tile has
+the rows of one chunk of the volume, so that each chunk is read once."""
+
+
+class RefinedParams(Params):
+    """What is done to the filtered map; nothing by default."""
+
+    left_right: bool = Field(False, description="drop what the right view's own map contradicts")
+    tolerance: float = Field(1.0, ge=0, description="largest difference of the two maps that is none, px (left_right)")
+    subpixel: bool = Field(False, description="move each disparity to the parabola's lowest point")
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The products that these settings need."""
+        right = ("right_disparity",) if self.left_right else ()
+        return ("semidense", *right, *(("costvolume",) if self.subpixel else ()))
+
+
+RIGHT_DISPARITY = Stage(
+    product="right_disparity",
+    inputs=("costvolume",),
+    outputs=(
+        Output("disparity", ("y", "x"), "float32", "px", "raw disparity of the right view: x_left = x_right + d"),
+    ),
+    compute="semidense.stages.disparity.right_view:compute_right_disparity",
+    tile_rows=32,
+)
+"""The right view's raw disparity, from the same cost volume. A tile has the rows of one chunk of the volume."""
+
+REFINED = Stage(
+    product="refined",
+    inputs=("semidense", "right_disparity", "costvolume"),
+    outputs=(Output("disparity", ("y", "x"), "float32", "px", "filtered disparity, checked and refined as asked"),),
+    compute="semidense.stages.disparity.refinement:compute_refined",
+    params=RefinedParams,
+    tile_rows=32,
+)
+"""The filtered map after the steps that were asked for; with none of them, the filtered map itself. Only those inputs
+are made that the settings need."""
+
+FILLED = Stage(
+    product="filled",
+    inputs=("refined",),
+    outputs=(
+        Output(
+            "disparity", ("y", "x"), "float32", "px", "disparity without holes; NaN only where there is none at all"
+        ),
+        Output("guessed", ("y", "x"), "bool", "1", "pixels that were filled: guesses, not measurements"),
+    ),
+    compute="semidense.stages.disparity.filling:compute_filled",
+)
+"""The refined map with its holes filled. Not tiled: a hole may be as high as the image."""

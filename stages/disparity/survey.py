@@ -1,0 +1,201 @@
+"""A quick look at a pair before any network runs: what disparities it has, and whether it is a rectified pair at all.
+
+On 24 rows of the views, shrunk to at most 480 px, square patches of the left view are sought in the right one, along
+the row and up to 8 rows above and below it, by normalised cross-correlation. A match counts when it is good, each patch
+is the other's best, no other place along the row is nearly as good, and its neighbours agree with it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semidense.stages.stage import Array, Arrays, Inputs, NoParams, Output, Stage
+from semidense.stages.transforms.gray import to_gray
+
+LONGEST = 480
+"""Longest side of the views that are compared, px."""
+REACH = 8
+"""Rows above and below that are searched, px of the shrunken views."""
+ENOUGH = 100
+"""Matches below which nothing is said of the pair."""
+_ROWS = 24
+_RADIUS = 6
+_SIDE = 2 * _RADIUS + 1
+_GOOD = 0.8
+_UNIQUE = 0.05
+_CONTRAST = 2.0
+_NEIGHBOURS = (-4, -3, -2, -1, 1, 2, 3, 4)
+_AGREEING = 3
+_SUPPORT = 0.005
+_MARGIN = 0.2
+_APART = 0.1
+_SHARE = 0.05
+
+_Floats = NDArray[np.float32]
+FIELDS = ("y", "x", "disparity", "vertical")
+"""What is told of a match, px of the image at hand: the left pixel, ``x_left - x_right`` and ``y_right - y_left``."""
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What was found.
+
+    Attributes:
+        matches: (match, field) float32, see ``FIELDS``.
+        range: (2,) float32, px: an estimate of the smallest and largest disparity; NaN with too few matches.
+        step: px of the image at hand to one of the shrunken views: how finely matches are placed.
+    """
+
+    matches: _Floats
+    range: _Floats
+    step: int
+
+
+def survey(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> Survey:
+    """Look at a pair.
+
+    Args:
+        left: (y, x) uint8 gray.
+        right: the other view, of the same size.
+
+    Returns:
+        The matches and the range. Views smaller than a patch, or without texture, have no matches.
+    """
+    step = max(1, -(-max(left.shape) // LONGEST))
+    views = shrink(left, step), shrink(right, step)
+    rows = [_row_matches(*views, y) for y in _rows(views[0].shape[0])] if min(views[0].shape) >= _SIDE else []
+    matches = np.concatenate([np.empty((0, len(FIELDS)), np.float32), *rows]) * np.float32(step)
+    return Survey(matches.astype(np.float32), estimate_range(matches, step, left.shape[1]), step)
+
+
+def shrink(view: NDArray[np.uint8], step: int) -> _Floats:
+    """Return the means of squares of ``step`` x ``step`` px; what is left over at the right and below is cut off."""
+    height, width = (length // step for length in view.shape)
+    squares = view[: height * step, : width * step].reshape(height, step, width, step)
+    means: _Floats = squares.mean(axis=(1, 3), dtype=np.float32)
+    return means
+
+
+def estimate_range(matches: Array, step: int, width: int) -> _Floats:
+    """Return the disparities to search, from those of the matches.
+
+    Lonely disparities do not count: within two steps of one there must be half a percent of the matches, on three rows;
+    and a group of disparities that lies apart, by a tenth of the width, must hold 5 %. What is left is widened by two
+    steps, and by a fifth of its span on the side of near things, which may have no texture. On the far side it goes to
+    0 if that at most triples it, since what is far often has none.
+
+    Args:
+        matches: (match, field), see ``FIELDS``.
+        step: px between the places that a match can have.
+        width: columns of the image, px.
+
+    Returns:
+        (2,) float32, whole px; NaN with fewer than ``ENOUGH`` matches.
+    """
+    values = _supported(matches[:, 2], matches[:, 0], step, width) if len(matches) >= ENOUGH else np.empty(0)
+    if not values.size:
+        return np.full(2, np.nan, np.float32)
+    low, high = float(values.min()), float(values.max())
+    first, last = _widened(low, high, step) if high > 0 else [-end for end in _widened(-high, -low, step)][::-1]
+    return np.array([np.floor(first), np.ceil(last)], np.float32)
+
+
+def _widened(low: float, high: float, step: int) -> tuple[float, float]:
+    far = 0.0 if 0 <= 3 * low <= 2 * high else low - _MARGIN * (high - low) * (low > 0) - 2 * step
+    return max(far, 0.0) if low >= 0 else far, high + _MARGIN * (high - low) + 2 * step
+
+
+def _supported(disparity: Array, row: Array, step: int, width: int) -> Array:
+    """Return those disparities, in order and each once, that enough matches share."""
+    values = np.array([value for value in np.unique(disparity) if _is_common(disparity, row, value, step)])
+    groups = np.split(values, np.nonzero(np.diff(values) > _APART * width)[0] + 1)
+    large = [group for group in groups if np.isin(disparity, group).sum() >= _SHARE * disparity.size]
+    return np.concatenate([np.empty(0), *large])
+
+
+def _is_common(disparity: Array, row: Array, value: float, step: int) -> bool:
+    near = np.abs(disparity - value) <= 2 * step
+    return bool(near.sum() >= max(8, _SUPPORT * disparity.size) and np.unique(row[near]).size >= 3)
+
+
+def _rows(height: int) -> Iterator[int]:
+    """Yield the first row of each patch that is looked at."""
+    count = min(_ROWS, height - _SIDE + 1)
+    yield from dict.fromkeys(np.linspace(0, height - _SIDE, count).astype(int).tolist())
+
+
+def _row_matches(left: _Floats, right: _Floats, y: int) -> _Floats:
+    """Return the matches of the patches whose first row is ``y``, (match, field), px of the shrunken views."""
+    own, contrast = _patches(left[y : y + _SIDE])
+    top = max(0, y - REACH)
+    others, _ = _patches(right[top : y + REACH + _SIDE])
+    scores = (own[0] @ others.reshape(-1, _SIDE * _SIDE).T).reshape(own.shape[1], *others.shape[:2])  # x, row, x right
+    found = scores.reshape(len(scores), -1).argmax(axis=1)
+    row, column = np.divmod(found, others.shape[1])
+    good = (contrast[0] > _CONTRAST) & _is_clear(scores, row, column)
+    x = np.arange(len(scores))
+    chosen = np.nonzero(good & _agreed(good, x - column, row))[0]
+    places = [np.full(chosen.size, y + _RADIUS), chosen + _RADIUS, (x - column)[chosen], (row + top - y)[chosen]]
+    return np.stack(places, axis=1).astype(np.float32)
+
+
+def _patches(strip: _Floats) -> tuple[_Floats, _Floats]:
+    """Return all patches of a strip with mean 0 and length 1, (row, x, pixel), and their deviations, (row, x)."""
+    patches = np.lib.stride_tricks.sliding_window_view(strip, (_SIDE, _SIDE))
+    flat = patches.reshape(*patches.shape[:2], -1)
+    centred = flat - flat.mean(axis=2, keepdims=True)
+    length = np.sqrt((centred * centred).sum(axis=2))
+    return centred / np.maximum(length, 1e-6)[..., np.newaxis], length / _SIDE
+
+
+def _is_clear(scores: _Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return whether each patch's best place is good, has it as its own best, and no rival along the row."""
+    x = np.arange(len(scores))
+    best = scores[x, row, column]
+    back = scores.argmax(axis=0)[row, column]
+    along = scores.max(axis=1)  # x, x right
+    along[np.abs(np.arange(along.shape[1]) - column[:, np.newaxis]) <= 2] = -1
+    clear: NDArray[np.bool_] = (best > _GOOD) & (np.abs(back - x) <= 1) & (along.max(axis=1) < best - _UNIQUE)
+    return clear
+
+
+def _agreed(good: NDArray[np.bool_], disparity: NDArray[np.intp], row: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return whether at least three of the eight nearest patches of the row moved alike."""
+    support = np.zeros(good.size, int)
+    for offset in _NEIGHBOURS:
+        alike = np.abs(np.roll(disparity, offset) - disparity) <= 1
+        support += np.roll(good, offset) & alike & (np.abs(np.roll(row, offset) - row) <= 1)
+    return support >= _AGREEING
+
+
+def compute_survey(_: NoParams, inputs: Inputs) -> Arrays:
+    """Compute the product ``survey``; see ``survey``."""
+    images = inputs["images"]
+    left, right = to_gray(images["left"]), to_gray(images["right"])
+    found = survey(left, right)
+    return {
+        "matches": found.matches,
+        "range": found.range,
+        "equal": np.array([np.mean(left == right)], np.float32),
+        "step": np.array([found.step], np.int32),
+        "left": np.rint(shrink(left, found.step)).astype(np.uint8),
+        "right": np.rint(shrink(right, found.step)).astype(np.uint8),
+    }
+
+
+SURVEY = Stage(
+    product="survey",
+    inputs=("images",),
+    outputs=(
+        Output("matches", ("match", "field"), "float32", "px", "sparse matches: " + ", ".join(FIELDS)),
+        Output("range", ("bound",), "float32", "px", "estimate of the smallest and largest disparity; NaN: none"),
+        Output("equal", ("all",), "float32", "1", "share of pixels that are equal in both views"),
+        Output("step", ("all",), "int32", "px", "side of the squares that the views were shrunk by"),
+        Output("left", ("row", "column"), "uint8", "1", "left view, gray, shrunk"),
+        Output("right", ("row", "column"), "uint8", "1", "right view, gray, shrunk"),
+    ),
+    compute="semidense.stages.disparity.survey:compute_survey",
+)
+"""A look at the pair. Not tiled: the views are shrunk first."""

@@ -1,0 +1,1 @@
+"""How often a confidence is right, measured on scenes that no network has seen."""

@@ -1,0 +1,38 @@
+"""What a confidence is worth: how often pixels of that confidence are right in scenes that no network has seen."""
+
+import numpy as np
+
+from semidense.stages.evaluation.calibration.declaration import MAPS, CalibrationParams
+from semidense.stages.evaluation.calibration.maps import FITS, calibrate, cross_validate
+from semidense.stages.evaluation.calibration.table import Table, tally
+from semidense.stages.stage import Arrays, Inputs, NoParams, StageError, by_scene
+
+
+def compute_calibration(params: CalibrationParams, inputs: Inputs) -> Arrays:
+    """Compute the product ``calibration``; of the maps, that of the lowest score on scenes it was not fitted to.
+
+    Raises:
+        StageError: if there is not one fold for each scene.
+    """
+    scenes = zip(*(by_scene(inputs, name) for name in ("confidence", "disparity", "truth")), strict=True)
+    counts = [
+        tally(confidence["confidence"], disparity["disparity"], truth["disparity"], params.tolerance)
+        for confidence, disparity, truth in scenes
+    ]
+    table = Table(np.stack([right for right, _ in counts]), np.stack([wrong for _, wrong in counts]), params.tolerance)
+    folds = np.array(params.fold_of_scene or (), np.intp)
+    if folds.size != len(counts) or len(np.unique(folds)) < 2:
+        raise StageError(f"{folds.size} folds were given for {len(counts)} scenes: one a scene, and two different ones")
+    scores = [cross_validate(table, folds, FITS[name]) for name in MAPS]
+    return {
+        "right": table.right,
+        "wrong": table.wrong,
+        "score": np.array(scores),
+        "log_odds": FITS[MAPS[int(np.argmin(scores))]](table),
+        "tolerance": np.array([params.tolerance]),
+    }
+
+
+def compute_calibrated_confidence(_: NoParams, inputs: Inputs) -> Arrays:
+    """Compute the product ``calibrated_confidence``; see ``calibrate``."""
+    return {"confidence": calibrate(inputs["confidence"]["confidence"], inputs["calibration"]["log_odds"])}

@@ -1,0 +1,1 @@
+"""The descriptor-Net and the fast cost volume that it fills."""

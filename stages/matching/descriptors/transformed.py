@@ -1,0 +1,160 @@
+"""The descriptor-Net in the transformed domain (see ``winograd``): the same numbers by a quarter of the products.
+
+A kernel whose taps lie s px apart treats every s-th pixel of every s-th row as an image of its own; a tile is four
+rows and columns of such an image, and so are the pixels that it answers. From layer to layer
+
+    split      transform 6 x 6 tiles, s px between their pixels                  (tile, 36, 64)
+    product    with the layer's transformed kernels                              (36, tile, 64)
+    merge      transform back, add the bias, cut at a floor                      (y, x, 64)
+
+for some tiles at a time, so that they stay in the processor's cache. The first layer has too few channels to gain.
+What is multiplied, and what comes of it, is float32 or bfloat16, as in ``transformed``.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn import functional
+
+from semidense.stages.compute.kernel import inlined, kernel
+from semidense.stages.matching.declaration import DILATIONS, REACH
+from semidense.stages.matching.descriptors.net import WIDTH, DescriptorNet
+from semidense.stages.matching.winograd.storage import Flat, Stored, stored
+from semidense.stages.matching.winograd.tiles import (
+    TILE,
+    Four,
+    Six,
+    forward6,
+    gather6,
+    inverse6,
+    load6,
+    pick6,
+    spread,
+    store4,
+    store6,
+)
+
+WHOLE = TILE * max(DILATIONS)
+"""Rows and columns of descriptors are made up to a multiple of this: then every layer has whole tiles."""
+TILES = 96
+"""Tiles that are transformed at once."""
+
+Corner = tuple[int, int]
+Layer = Callable[[Tensor, Tensor, Tensor, float, int], Tensor]
+"""``layer(maps, weight, bias, floor, step)``, as ``convolved``."""
+
+
+@inlined
+def corner(tile: int, step: int, width: int) -> Corner:
+    """Return the first pixel that a tile answers; ``width``: columns of all answers."""
+    tiles = width // TILE
+    row, column = tile // tiles, tile % tiles
+    return row // step * TILE * step + row % step, column // step * TILE * step + column % step
+
+
+@inlined
+def six_pixels(maps: NDArray[np.float32], y: int, x: int, step: int) -> Six[Stored]:
+    """Return the channels of six pixels of a row, ``step`` px apart."""
+    return (
+        maps[y, x],
+        maps[y, x + step],
+        maps[y, x + 2 * step],
+        maps[y, x + 3 * step],
+        maps[y, x + 4 * step],
+        maps[y, x + 5 * step],
+    )
+
+
+@kernel
+def split(maps: NDArray[np.float32], first: int, count: int, step: int, tiles: Stored) -> None:
+    """Transform the tiles of maps (y, x, WIDTH) from tile ``first`` on: (tile, 36, WIDTH)."""
+    row = 6 * WIDTH
+    part = np.empty(6 * row, np.float32)  # one tile, transformed along its rows
+    for tile in range(count):
+        y, x = corner(first + tile, step, maps.shape[1] - 2 * step)
+        for k in range(6):
+            pixels, line = six_pixels(maps, y + k * step, x, step), part[k * row : (k + 1) * row]
+            for c in range(WIDTH):
+                store6(line, WIDTH, c, forward6(pick6(pixels, c)))
+        out = tiles[tile * 6 * row : (tile + 1) * 6 * row]
+        for c in range(row):
+            store6(out, row, c, forward6(load6(part, row, c)))
+
+
+@kernel
+def merge(products: Stored, bias: Flat, floor: np.float32, first: int, step: int, maps: NDArray[np.float32]) -> None:
+    """Transform products (36, tile, WIDTH) back, add the bias, cut at the floor, into maps (y, x, WIDTH)."""
+    row = 6 * WIDTH
+    part = np.empty(TILE * row, np.float32)
+    for tile in range(products.shape[1]):
+        for j in range(6):
+            numbers, column = gather6(products, j, tile), part[j * WIDTH :]
+            for c in range(WIDTH):
+                store4(column, row, c, inverse6(pick6(numbers, c)))
+        y, x = corner(first + tile, step, maps.shape[1])
+        for k in range(TILE):
+            line, below = part[k * row : (k + 1) * row], y + k * step
+            one, two = maps[below, x], maps[below, x + step]
+            three, four = maps[below, x + 2 * step], maps[below, x + 3 * step]
+            for c in range(WIDTH):
+                one[c], two[c], three[c], four[c] = _floored(inverse6(load6(line, WIDTH, c)), bias[c], floor)
+
+
+@inlined
+def _floored(v: Four[np.float32], bias: np.float32, floor: np.float32) -> Four[np.float32]:
+    return max(v[0] + bias, floor), max(v[1] + bias, floor), max(v[2] + bias, floor), max(v[3] + bias, floor)
+
+
+def kernels_of(net: DescriptorNet, dtype: torch.dtype = torch.float32) -> list[Tensor]:
+    """Return the kernels of every layer but the first in the transformed domain; gradients flow back to them."""
+    return [spread(layer.weight).to(dtype) for layer in [*net.hidden[1:], net.out]]
+
+
+def convolved(maps: Tensor, weight: Tensor, bias: Tensor, floor: float, step: int) -> Tensor:
+    """Return what a layer makes of maps, cut at a floor: (y + 2 step, x + 2 step, 64) -> (y, x, 64).
+
+    Args:
+        maps: float32, contiguous; y and x multiples of 4 step.
+        weight: (36, 64, 64), the transformed kernels; their dtype is that of what is multiplied.
+        bias: (64,).
+        floor: 0 for a ReLU, minus infinity for none.
+        step: distance of the kernels' taps, px.
+    """
+    made = torch.empty(maps.shape[0] - 2 * step, maps.shape[1] - 2 * step, WIDTH)
+    total = made.shape[0] * made.shape[1] // TILE**2
+    tiles = torch.empty(TILES, 36, WIDTH, dtype=weight.dtype)
+    products = torch.empty(36 * TILES * WIDTH, dtype=weight.dtype)
+    for first in range(0, total, TILES):
+        count = min(TILES, total - first)
+        split(maps.numpy(), first, count, step, stored(tiles.view(-1)))
+        answers = products[: 36 * count * WIDTH].view(36, count, WIDTH)
+        torch.bmm(tiles[:count].transpose(0, 1), weight, out=answers)
+        merge(stored(answers), bias.numpy(), np.float32(floor), first, step, made.numpy())
+    return made
+
+
+def transformed_descriptors(
+    net: DescriptorNet, kernels: Sequence[Tensor], view: Tensor, layer: Layer = convolved
+) -> Tensor:
+    """Return the descriptors of a view, as the network makes them.
+
+    Args:
+        net: the network.
+        kernels: of ``kernels_of``.
+        view: float32 (channels, y + 16, x + 16).
+        layer: ``convolved``, or one that gradients flow through.
+
+    Returns:
+        float32 (y, x, 64), of unit length.
+    """
+    height, width = (length - 2 * REACH for length in view.shape[1:])
+    made_up = functional.pad(view[None], (0, -width % WHOLE, 0, -height % WHOLE))
+    first = net.hidden[0](net.normalised(made_up.contiguous(memory_format=torch.channels_last)))
+    maps = functional.relu(first[0].permute(1, 2, 0)).contiguous()
+    for own, weight, step in zip([*net.hidden[1:], net.out], kernels, DILATIONS[1:], strict=True):
+        maps = layer(maps, weight, own.bias, -math.inf if own is net.out else 0.0, step)
+    return functional.normalize(maps[:height, :width], dim=2)

@@ -1,0 +1,205 @@
+import itertools
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from semidense.cache.errors import SourceNotFound
+from semidense.cache.keys.code import _locate, _parts, _read, code_hash, code_parts
+
+Tree = Callable[..., str]
+_numbers = itertools.count()
+
+
+def _forget() -> None:
+    for each in (_locate, _read, _parts):
+        each.cache_clear()
+
+
+@pytest.fixture
+def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Tree]:
+    """Write a package of the given files, ``PKG`` standing for its name; return the name."""
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def write(files: dict[str, str], name: str | None = None) -> str:
+        package = name or f"package_of_test_{next(_numbers)}"
+        for path, text in {"__init__.py": "", **files}.items():
+            file = tmp_path / package / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text.replace("PKG", package), encoding="utf-8")
+        _forget()
+        return package
+
+    yield write
+    _forget()
+
+
+SOURCE = '''
+"""About."""
+import math
+
+LIMIT = 3
+"""What it limits."""
+
+
+def area(r: float) -> float:
+    """Return the area."""
+    return math.pi * r**2  # of a circle
+
+
+class Circle:
+    """A circle."""
+
+    r = 1
+'''
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        pytest.param("# of a circle", "# of a disc", id="comment"),
+        pytest.param("  # of a circle", "", id="comment gone"),
+        pytest.param('"""About."""\n', "", id="module docstring"),
+        pytest.param("Return the area", "Compute it", id="function docstring"),
+        pytest.param('    """A circle."""\n', "", id="class docstring"),
+        pytest.param("What it limits", "The limit", id="note under an assignment"),
+        pytest.param("\n\n\ndef", "\n\n\n\n\n\ndef", id="position"),
+        pytest.param("math.pi * r**2", "(math.pi\n        * r ** 2)", id="layout"),
+        pytest.param("import math", "import math\n# more\n", id="comment line"),
+    ],
+)
+def test_text_edits_do_not_change_the_hash(tree: Tree, old: str, new: str) -> None:
+    assert old in SOURCE
+    package = tree({"m.py": SOURCE})
+    before = code_hash(f"{package}.m", (package,))
+    tree({"m.py": SOURCE.replace(old, new, 1)}, package)
+    assert code_hash(f"{package}.m", (package,)) == before
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        pytest.param("r**2", "r**3", id="number"),
+        pytest.param("LIMIT = 3", "LIMIT = 3.0", id="type of a constant"),
+        pytest.param("LIMIT = 3", "LIMIT = '3'", id="text"),
+        pytest.param("math.pi", "math.e", id="name"),
+        pytest.param("    r = 1", "    r = 2", id="class attribute"),
+    ],
+)
+def test_code_edits_change_the_hash(tree: Tree, old: str, new: str) -> None:
+    package = tree({"m.py": SOURCE})
+    before = code_hash(f"{package}.m", (package,))
+    tree({"m.py": SOURCE.replace(old, new, 1)}, package)
+    assert code_hash(f"{package}.m", (package,)) != before
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        pytest.param("import PKG.sub.helper", id="import"),
+        pytest.param("import PKG.sub.helper as h", id="import as"),
+        pytest.param("from PKG.sub import helper", id="from package import module"),
+        pytest.param("from PKG.sub.helper import f", id="from module import name"),
+        pytest.param("from PKG.sub.helper import *", id="star from module"),
+        pytest.param("from PKG.sub import *", id="star from package"),
+        pytest.param("from .sub import helper", id="relative module"),
+        pytest.param("from .sub.helper import f as g", id="relative name"),
+        pytest.param("def f():\n    from PKG.sub import helper", id="inside a function"),
+        pytest.param("try:\n    import PKG.sub.helper\nexcept ImportError:\n    pass", id="inside try"),
+        pytest.param("if 0:\n    pass\nelse:\n    import os, PKG.sub.helper", id="second of two"),
+        pytest.param("import importlib\nimportlib.import_module('PKG.sub.helper')", id="import_module"),
+        pytest.param(
+            "from importlib import import_module as i, import_module\nimport_module('.sub.helper', 'PKG')",
+            id="relative import_module",
+        ),
+        pytest.param("__import__('PKG.sub.helper')", id="__import__"),
+        pytest.param("from PKG import middle", id="through another module"),
+        pytest.param("from . import middle", id="from . import"),
+    ],
+)
+def test_each_import_form_is_followed(tree: Tree, statement: str) -> None:
+    files = {
+        "m.py": statement,
+        "middle.py": "from .sub.deeper import leaf",
+        "sub/__init__.py": "",
+        "sub/helper.py": "X = 1",
+        "sub/deeper/__init__.py": "from ... import other",
+        "sub/deeper/leaf.py": "from .. import helper",
+        "other.py": "",
+    }
+    package = tree(files)
+    before = code_parts(f"{package}.m", (package,))
+    assert f"{package}.sub.helper" in before
+    tree({**files, "sub/helper.py": "X = 2"}, package)
+    after = code_parts(f"{package}.m", (package,))
+    assert {name for name in before if before[name] != after[name]} == {f"{package}.sub.helper"}
+
+
+def test_parent_packages_count(tree: Tree) -> None:
+    package = tree({"__init__.py": "from .setup import X", "setup.py": "X = 1", "sub/__init__.py": "", "sub/m.py": ""})
+    parts = code_parts(f"{package}.sub.m", (package,))
+    assert list(parts) == [package, f"{package}.setup", f"{package}.sub", f"{package}.sub.m"]
+
+
+def test_a_module_with_its_package_s_relative_imports(tree: Tree) -> None:
+    package = tree({"sub/__init__.py": "from .a import X\nfrom ..b import Y", "sub/a.py": "", "b.py": ""})
+    assert set(code_parts(f"{package}.sub", (package,))) == {
+        package,
+        f"{package}.sub",
+        f"{package}.sub.a",
+        f"{package}.b",
+    }
+
+
+def test_cycles_end(tree: Tree) -> None:
+    package = tree({"a.py": "from PKG import b", "b.py": "from PKG import a"})
+    assert code_parts(f"{package}.a", (package,)) == code_parts(f"{package}.b", (package,))
+
+
+def test_packages_without_init_and_other_packages(tree: Tree) -> None:
+    package = tree({"space/m.py": "import json, numpy, unheard_of\nfrom PKG.space import data", "space/data/x.txt": ""})
+    assert set(code_parts(f"{package}.space.m", (package,))) == {package, f"{package}.space.m"}
+
+
+def test_nothing_is_imported(tree: Tree) -> None:
+    package = tree({"__init__.py": "raise SystemExit", "m.py": "raise SystemExit"})
+    assert code_hash(f"{package}.m", (package,))
+    assert package not in sys.modules
+
+
+def test_the_same_source_elsewhere_has_the_same_hash(tree: Tree) -> None:
+    first, second = (tree({"m.py": SOURCE}) for _ in range(2))
+    assert code_parts(f"{first}.m", (first,))[f"{first}.m"] == code_parts(f"{second}.m", (second,))[f"{second}.m"]
+
+
+def test_files_are_read_once_a_process(tree: Tree) -> None:
+    package = tree({"m.py": "X = 1"})
+    before = code_hash(f"{package}.m", (package,))
+    assert _locate(f"{package}.m") is not None
+    file = Path(str(_locate(f"{package}.m").file))  # type: ignore[union-attr]
+    file.write_text("X = 2", encoding="utf-8")
+    assert code_hash(f"{package}.m", (package,)) == before
+
+
+def test_the_result_is_the_callers_own(tree: Tree) -> None:
+    package = tree({"m.py": ""})
+    code_parts(f"{package}.m", (package,)).clear()
+    assert code_parts(f"{package}.m", (package,))
+
+
+@pytest.mark.parametrize(
+    ("files", "module"),
+    [
+        pytest.param({}, "PKG.missing", id="no such module"),
+        pytest.param({}, "unheard_of.module", id="no such package"),
+        pytest.param({}, "__main__", id="a script"),
+        pytest.param({"m.py": "def ("}, "PKG.m", id="not Python"),
+        pytest.param({"m.py": "x = '\0'"}, "PKG.m", id="a NUL byte"),
+        pytest.param({"m.py": "from ... import x"}, "PKG.m", id="relative beyond the top"),
+    ],
+)
+def test_refuses(tree: Tree, files: dict[str, str], module: str) -> None:
+    package = tree(files)
+    with pytest.raises(SourceNotFound, match=r"^[^\n]+$"):
+        code_hash(module.replace("PKG", package), (package,))

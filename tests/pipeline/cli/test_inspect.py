@@ -1,0 +1,70 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from semidense.pipeline.api import Result, Task, explain, open_store
+from semidense.pipeline.cli.inspect import Inspection, draw, inspection, statistics
+from semidense.pipeline.plan.errors import UsageError
+
+
+@pytest.fixture
+def costs(trained: Result, trained_task: Task) -> Inspection:
+    return inspection(explain(trained_task, "costvolume"), trained.store)
+
+
+def test_a_product_that_is_not_cached_comes_with_the_command_that_makes_it(tmp_path: Path) -> None:
+    task = Task("synthetic:train=0,test=1", cache=tmp_path)
+    with pytest.raises(UsageError, match=r"images of test-0 is not cached \(never made\): .*--upto images"):
+        inspection(explain(task, "images"), open_store(tmp_path))
+
+
+def test_statistics_leave_nan_out_and_count_it() -> None:
+    values = np.array([[1, 2], [np.nan, 6]], np.float32)
+    (row,) = statistics(xr.Dataset({"map": (("y", "x"), values, {"units": "px"})}).chunk())
+    assert row == {
+        "name": "map", "dims": "y 2 x x 2", "dtype": "float32", "units": "px",
+        "min": 1.0, "max": 6.0, "mean": 3.0, "none": 0.25,
+    }  # fmt: skip
+
+
+def test_an_array_without_a_number_has_no_figures() -> None:
+    (row,) = statistics(xr.Dataset({"map": (("y",), np.full(3, np.nan, np.float32))}).chunk())
+    assert set(row) == {"name", "dims", "dtype", "units", "none"}
+    assert row["none"] == 1.0
+
+
+def test_an_empty_array_has_no_figures() -> None:
+    (row,) = statistics(xr.Dataset({"map": (("y",), np.zeros(0))}))
+    assert set(row) == {"name", "dims", "dtype", "units"}
+
+
+def test_what_is_derived_is_not_listed(costs: Inspection) -> None:
+    assert "probability" in costs.dataset
+    assert [row["name"] for row in statistics(costs.dataset)] == ["cost"]
+
+
+@pytest.mark.parametrize(
+    ("pixel", "disparity", "message"),
+    [
+        pytest.param("12", None, "pixel '12': write Y,X such as 120,200", id="one number"),
+        pytest.param("a,b", None, "write Y,X", id="no numbers"),
+        pytest.param("64,0", None, "outside the image of 64 x 80 px", id="below the image"),
+        pytest.param("-1,0", None, "outside the image", id="above the image"),
+        pytest.param("0,80", None, "outside the image", id="right of the image"),
+        pytest.param(None, 9, "disparity 9", id="a disparity the volume has not"),
+    ],
+)
+def test_what_is_not_in_the_product_is_refused(
+    costs: Inspection, tmp_path: Path, pixel: str | None, disparity: int | None, message: str
+) -> None:
+    with pytest.raises(UsageError, match=message) as caught:
+        draw(costs, tmp_path / "p.png", pixel, disparity)
+    assert "\n" not in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_that_cannot_be_written_is_refused(costs: Inspection, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="cannot be written"):
+        draw(costs, tmp_path / "none" / "p.png", None, None)

@@ -1,0 +1,105 @@
+import io
+import sys
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from semidense.pipeline.execution import progress
+from semidense.pipeline.execution.progress import ProgressWatch
+from semidense.pipeline.plan.plan import Made
+from tests.pipeline.toy import RAMP, SUM, step
+
+NO_DRAFT: Any = None
+TILED, TRAINED = step(RAMP, 0), step(replace(SUM, monitored=True))
+
+
+@pytest.fixture
+def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """A clock to set."""
+    clock = [0.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: clock[0])
+    return clock
+
+
+def test_without_a_terminal_nothing_is_said_of_quick_work(capsys: pytest.CaptureFixture[str], now: list[float]) -> None:
+    with ProgressWatch() as watch:
+        watch.begun(TILED, NO_DRAFT, 2)
+        watch.advanced(TILED, 1, 2, "")
+        watch.published(Made(TILED, "k", "d", 0.5, False))
+    assert capsys.readouterr() == ("", "")
+
+
+def test_without_a_terminal_long_work_says_a_line_now_and_then(
+    capsys: pytest.CaptureFixture[str], now: list[float]
+) -> None:
+    with ProgressWatch() as watch:
+        watch.begun(TRAINED, NO_DRAFT, 1)
+        for done in range(1, 101):
+            now[0] = done * 1.0
+            watch.advanced(TRAINED, done, 100, f"loss {1 / done:.2f}")
+        watch.published(Made(TRAINED, "k", "d", 100.0, False))
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.splitlines() == [
+        "sum of Toy: 20 of 100, about 80 s left loss 0.05",
+        "sum of Toy: 40 of 100, about 60 s left loss 0.03",
+        "sum of Toy: 60 of 100, about 40 s left loss 0.02",
+        "sum of Toy: 80 of 100, about 20 s left loss 0.01",
+        "made sum of Toy in 100.0 s",
+    ]
+
+
+def test_steps_of_a_checkpoint_took_no_time(capsys: pytest.CaptureFixture[str], now: list[float]) -> None:
+    with ProgressWatch() as watch:
+        watch.begun(TRAINED, NO_DRAFT, 1)
+        for done in range(61, 101):
+            now[0] = (done - 60) * 1.0
+            watch.advanced(TRAINED, done, 100, "")
+    assert capsys.readouterr().err == "sum of Toy: 80 of 100, about 20 s left\n"
+
+
+def test_tiles_add_up(capsys: pytest.CaptureFixture[str], now: list[float]) -> None:
+    with ProgressWatch() as watch:
+        watch.begun(TILED, NO_DRAFT, 4)
+        watch.advanced(TILED, 1, 4, "")
+        now[0] = 30.0
+        watch.advanced(TILED, 1, 4, "")
+    assert capsys.readouterr().err == "ramp of Toy: 2 of 4, about 30 s left\n"
+
+
+def test_what_was_there_is_not_announced(capsys: pytest.CaptureFixture[str]) -> None:
+    with ProgressWatch() as watch:
+        watch.published(Made(TILED, "k", "d", 100.0, True))
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_step_that_was_never_begun_is_ignored() -> None:
+    with ProgressWatch() as watch:
+        watch.advanced(TILED, 1, 2, "")
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_on_a_terminal_there_is_a_bar_with_a_rate_and_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    watch = ProgressWatch()
+    watch._console = watch._bars.live.console = Console(file=terminal, force_terminal=True, width=120)
+    with watch:
+        watch.begun(TRAINED, NO_DRAFT, 1)
+        for done in (1, 2, 3):
+            watch.advanced(TRAINED, done, 10, "loss 0.25")
+        watch._bars.refresh()
+        watch.published(Made(TRAINED, "k", "d", 2.0, False))
+    shown = terminal.getvalue()
+    assert "sum of Toy" in shown
+    assert "3/10" in shown
+    assert "/s" in shown
+    assert "loss 0.25" in shown
+    assert "made sum of Toy in 2.0 s" in shown

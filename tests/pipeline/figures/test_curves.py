@@ -1,0 +1,78 @@
+from typing import Any
+
+import pytest
+
+from semidense.pipeline.figures.curves import error_curve_figure, mean_curve
+from semidense.pipeline.plan.errors import UsageError
+
+
+def row(scene: str, R: float | None, invalid: float, bad: float | None, **more: object) -> dict[str, Any]:
+    figures = {"R": R, "invalid": invalid, "bad": bad}
+    known = {name: value for name, value in figures.items() if value is not None}
+    return {"scene": scene, "mask": "nonocc", "threshold_px": 1.0} | known | more
+
+
+ROWS = [
+    row("a", 0.9, 40, 1),
+    row("a", 0.1, 0, 8),
+    row("b", 0.1, 10, 4),
+    row("b", 0.9, 60, 3),
+    row("a", 0.1, 99, 99, mask="all"),
+    row("a", 0.1, 99, 99, threshold_px=2.0),
+    row("b", None, 0, 50),
+]
+
+
+def curves(rows: list[dict[str, Any]]) -> dict[str, list[tuple[float, float]]]:
+    lines = error_curve_figure(rows).axes[0].lines
+    return {str(line.get_label()): [tuple(point) for point in line.get_xydata().tolist()] for line in lines}
+
+
+def test_a_line_a_scene_in_order_and_their_mean() -> None:
+    assert curves(ROWS) == {
+        "a": [(0, 8), (40, 1)],
+        "b": [(10, 4), (60, 3)],
+        "mean of 2 scenes": [(5, 6), (50, 2)],
+    }
+
+
+def test_the_mean_stops_where_a_scene_reports_nothing() -> None:
+    rows = [*ROWS, row("a", 0.95, 70, 0.5), row("b", 0.95, 100, None)]
+    assert curves(rows)["mean of 2 scenes"] == [(5, 6), (50, 2)]
+
+
+def test_variants_are_told_apart() -> None:
+    rows = [
+        row("a", 0.1, 0, value, variant=f"semidense.R=0.1, channels.rank_window={window}")
+        for window, value in ((15, 8), (31, 7))
+    ]
+    assert curves(rows) == {"a, channels.rank_window=15": [(0, 8)], "a, channels.rank_window=31": [(0, 7)]}
+
+
+def test_axes_say_quantity_mask_threshold_and_and_unit() -> None:
+    axes = error_curve_figure(ROWS).axes[0]
+    assert axes.get_xlabel() == "invalid: nonocc pixels without a disparity (%)"
+    assert axes.get_ylabel() == "bad: reported nonocc pixels off by more than 1 px (%)"
+    assert [text.get_text() for text in axes.texts] == ["R = 0.1", "R = 0.9"]
+    assert axes.get_ylim()[0] == 0
+
+
+def test_another_mask_and_threshold_can_be_drawn() -> None:
+    lines = error_curve_figure(ROWS, mask="all").axes[0].lines
+    assert lines[0].get_xydata().tolist() == [[99, 99]]
+
+
+def test_a_scene_is_taken_literally() -> None:
+    figure = error_curve_figure([row("$x_", 0.1, 0, 8)], title="$y_")
+    figure.draw_without_rendering()
+    assert figure.axes[0].get_legend().get_texts()[0].get_text() == "$x_"
+
+
+@pytest.mark.parametrize("rows", [pytest.param([], id="none"), pytest.param(ROWS[-1:], id="no-R")])
+def test_nothing_to_draw_is_refused(rows: list[dict[str, Any]]) -> None:
+    with pytest.raises(UsageError, match="mask nonocc and the threshold 1 px"):
+        error_curve_figure(rows)
+
+
+def test_mean_of_one_curve_is_itself() -> None:
+    assert mean_curve([{0.5: (1.0, 2.0)}]) == {0.5: (1.0, 2.0)}

@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+from semidense.datasets import DisparityRange
+from semidense.pipeline.pairs.findings import findings
+from semidense.stages.disparity.survey import ENOUGH
+
+
+def survey(
+    disparity: object, vertical: object = 0, *, count: int = 1000, equal: float = 0.1, step: int = 1
+) -> dict[str, np.ndarray]:
+    matches = np.zeros((count, 4), np.float32)
+    matches[:, 2], matches[:, 3] = disparity, vertical
+    return {"matches": matches, "equal": np.array([equal]), "step": np.array([step])}
+
+
+RAMP = np.linspace(-1, 1, 1000)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        pytest.param(survey(20 + 5 * RAMP), None, id="a sound pair"),
+        pytest.param(survey(20, np.where(RAMP > 0.8, 3, 0)), None, id="a few stray rows"),
+        pytest.param(survey(3 * RAMP), None, id="both signs, as of turned cameras"),
+        pytest.param(survey(0, equal=1.0), "the same picture", id="one picture twice"),
+        pytest.param(survey(0.2 * RAMP), "hardly differ", id="a camera that stood still"),
+        pytest.param(survey(-20), "exchanged", id="left for right"),
+        pytest.param(survey(20, 4), r"unrectified: the right view lies \+4 px", id="one camera lower"),
+        pytest.param(survey(20, 6 * RAMP), r"\(-4 to \+4, measured to 1 px\)", id="one camera turned"),
+        pytest.param(survey(20, 1, step=6), None, id="less than can be measured"),
+        pytest.param(survey(20, count=ENOUGH - 1), "only 99 places agree", id="nothing in common"),
+    ],
+)
+def test_what_looks_wrong_is_said_in_one_line(found: dict[str, np.ndarray], expected: str | None) -> None:
+    said = findings(found, None)
+    assert len(said) == (expected is not None)
+    if expected:
+        assert "\n" not in said[0]
+        with pytest.raises(ValueError, match=expected):
+            raise ValueError(said[0])
+
+
+@pytest.mark.parametrize(("low", "warned"), [(-30, False), (0, True)])
+def test_negative_disparities_that_were_asked_for_are_no_surprise(low: int, warned: bool) -> None:
+    assert bool(findings(survey(-20), DisparityRange(low, 30))) == warned

@@ -1,0 +1,25 @@
+import pytest
+
+from semidense.pipeline.plan.config import Config
+from semidense.pipeline.plan.resolution import resolved
+from semidense.stages.compute import precision
+
+TRAINED = ("matching_net", "descriptor_net")
+RUN = ("costvolume", "confidence", "evaluation_net")
+
+
+@pytest.mark.parametrize(
+    ("flag", "trained", "run"),
+    [
+        pytest.param("amx_bf16", "bfloat16", "bfloat16", id="AMX"),
+        pytest.param("avx512_bf16", "float32", "bfloat16", id="AVX512-BF16"),
+        pytest.param("avx512f", "float32", "float32", id="neither"),
+    ],
+)
+def test_auto_is_what_the_cpu_is_fast_at(flag: str, trained: str, run: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The gradients of transformed convolutions are in float32 alone, which plain ones outrun with AMX only."""
+    monkeypatch.setattr(precision, "cpu_flags", lambda: frozenset({flag}))
+    config = Config()
+    for sections, expected in ((TRAINED, trained), (RUN, run)):
+        for section in sections:
+            assert resolved(getattr(config, section), None).precision == expected, section

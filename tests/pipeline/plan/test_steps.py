@@ -1,0 +1,295 @@
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from semidense.datasets import Dataset, SceneSource, open_dataset
+from semidense.pipeline.plan import shipped_weights as shipped
+from semidense.pipeline.plan.config import Config
+from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.steps import PRODUCTS, SPLIT, Graph, Request, Step, build
+from semidense.pipeline.plan.training_split import training_scenes
+from semidense.stages.stage import StageError
+from tests.tiny import PATH
+
+DATASET = open_dataset("synthetic:train=2,test=2,height=64,width=80,disparities=8")
+SHIPPED = {"matching_net", "evaluation_net"}
+
+
+@pytest.fixture(autouse=True)
+def weights_of_no_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Graphs need the digest of the weights only."""
+    (tmp_path / "weights").write_bytes(b"none")
+    monkeypatch.setattr(shipped, "weights_file", lambda _: tmp_path / "weights")
+    shipped.weights_digest.cache_clear()
+    yield
+    shipped.weights_digest.cache_clear()
+
+
+TRAINING = {"matching_samples", "right_disparity", "evaluation_samples"}
+"""Products of a whole run that only a training needs."""
+
+
+def graph(*settings: str, upto: str = "metrics", train: bool = False, dataset: Dataset = DATASET) -> Graph:
+    training = training_scenes(dataset) if train else ()
+    return build(Request(dataset, {"": Config.load(None, settings)}, upto, train, training))
+
+
+def counts(made: Graph) -> Counter[str]:
+    return Counter(step.product for step in made.steps.values())
+
+
+def test_without_training_every_scene_is_worked_on_with_the_shipped_weights() -> None:
+    made = graph()
+    assert counts(made) == Counter(dict.fromkeys(PATH - TRAINING, 4)) - Counter(dict.fromkeys(SHIPPED, 3))
+    assert made.notes == []
+    assert len(made.targets) == 4
+
+
+def test_with_training_the_training_scenes_are_only_learnt_from() -> None:
+    made = graph(train=True)
+    four = dict.fromkeys(("images", "truth", "channels", "costvolume", "disparity"), 4)
+    one = dict.fromkeys(("matching_samples", "matching_net", "evaluation_samples", "evaluation_net"), 1)
+    two = dict.fromkeys(("right_disparity", "confidence", "semidense", "metrics"), 2)
+    assert counts(made) == Counter({**four, **one, **two})
+    assert [made.steps[each].scene for each, _ in made.targets] == ["test-0", "test-1"]
+    assert [note.split(" ")[0] for note in made.notes] == ["train-0", "train-1"]
+
+
+def test_training_scenes_are_known_by_their_content_not_their_name() -> None:
+    renamed = tuple(replace(scene, name=f"other/{scene.name}", split="test") for scene in DATASET.scenes)
+    request = Request(Dataset("renamed", renamed), {"": Config()}, "metrics", True, training_scenes(DATASET))
+    made = build(request)
+    assert [made.steps[each].scene for each, _ in made.targets] == ["other/test-0", "other/test-1"]
+    assert [note.split(" ")[0] for note in made.notes] == ["other/train-0", "other/train-1"]
+
+
+def test_where_all_scenes_are_trained_on_nothing_is_left() -> None:
+    only = Dataset("synthetic", training_scenes(DATASET))
+    with pytest.raises(UsageError, match="no scene is left to work on; train-0 is a training scene") as caught:
+        build(Request(only, {"": Config()}, "metrics", True, only.scenes))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("upto", ["matching_samples", "matching_net", "evaluation_net"])
+def test_a_product_of_the_split_is_made_once(upto: str) -> None:
+    made = graph(upto=upto, train=True)
+    ((target, _),) = made.targets
+    assert (made.steps[target].product, made.steps[target].scene) == (upto, SPLIT)
+    assert {step.scene for step in made.steps.values()} == {"train-0", "train-1", SPLIT}
+
+
+def test_a_training_can_rest_on_networks_that_come_with_the_package() -> None:
+    made = graph('training.shipped=["matching_net"]', upto="evaluation_net", train=True)
+    assert "matching_samples" not in counts(made)
+    assert find(made, "matching_net", SPLIT).settings == find(graph(), "matching_net", SPLIT).settings
+    assert "shipped" not in find(made, "evaluation_net", SPLIT).settings
+
+
+@pytest.mark.parametrize(("mode", "ending"), [("exact", ""), ("guided", ".guided"), ("fast", "")])
+def test_raw_maps_of_a_mode_are_scored_by_what_was_learnt_from_such(mode: str, ending: str) -> None:
+    made = graph(f"costvolume.mode={mode}", "semidense.max_error=0.1", upto="semidense")
+    used = {step.argument for step in made.steps.values() if "shipped" in step.settings}
+    nets = {"matching_net", "descriptor_net"} - {{"exact": "descriptor_net", "fast": "matching_net"}.get(mode)}
+    assert used == nets | {f"evaluation_net{ending}", f"calibration{ending}"}
+
+
+def test_a_run_stops_at_the_product_asked_for() -> None:
+    assert set(counts(graph(upto="channels"))) == {"images", "channels"}
+    assert set(counts(graph(upto="costvolume"))) == {"images", "channels", "matching_net", "costvolume"}
+
+
+@pytest.mark.parametrize("train", [False, True])
+@pytest.mark.parametrize("upto", PRODUCTS)
+def test_every_step_comes_after_its_inputs(upto: str, train: bool) -> None:
+    if upto in ("matching_samples", "evaluation_samples") and not train:
+        pytest.skip("samples are drawn for training only")
+    before: set[str] = set()
+    for step in graph(upto=upto, train=train).steps.values():
+        assert {each for ids in step.inputs.values() for each in ids} <= before
+        before.add(step.id)
+
+
+def test_products_are_in_order() -> None:
+    places = [PRODUCTS.index(step.product) for step in graph(train=True).steps.values()]
+    assert places == sorted(places)
+
+
+def variants(*each: str) -> Graph:
+    configs = {setting: Config.load(None, [setting]) for setting in each}
+    return build(Request(DATASET.select(["test-0"]), configs))
+
+
+def test_a_sweep_over_the_threshold_shares_all_above() -> None:
+    made = variants("semidense.R=0.1", "semidense.R=0.5", "semidense.R=0.9")
+    assert {product: count for product, count in counts(made).items() if count > 1} == {"semidense": 3, "metrics": 3}
+    assert [variant for _, variant in made.targets] == ["semidense.R=0.1", "semidense.R=0.5", "semidense.R=0.9"]
+    assert [made.steps[each].R for each, _ in made.targets] == [0.1, 0.5, 0.9]
+
+
+def test_a_sweep_over_a_setting_shares_what_does_not_depend_on_it() -> None:
+    made = counts(variants("disparity.subpixel=true", "disparity.subpixel=false"))
+    assert {product for product, count in made.items() if count == 1} == {
+        "images", "truth", "channels", "matching_net", "costvolume", "evaluation_net",
+    }  # fmt: skip
+
+
+def test_equal_configurations_are_one() -> None:
+    assert len(variants("semidense.R=0.9", "channels.rank_window=31").steps) == len(variants("semidense.R=0.9").steps)
+
+
+def without_truth() -> Dataset:
+    """As in KITTI's test set: a scene whose truth is not published."""
+    scenes = [replace(scene, has_truth=scene.name != "test-1") for scene in DATASET.scenes]
+    return Dataset("kitti", tuple(scenes))
+
+
+def test_a_scene_without_truth_gets_maps_and_no_metrics() -> None:
+    made = graph(dataset=without_truth())
+    last = {made.steps[each].scene: made.steps[each].product for each, _ in made.targets}
+    assert last == {"train-0": "metrics", "train-1": "metrics", "test-0": "metrics", "test-1": "semidense"}
+    assert made.notes == ["test-1 has no ground truth: there are no metrics for it"]
+    assert not [step for step in made.steps.values() if step.product == "truth" and step.scene == "test-1"]
+
+
+def test_a_scene_without_truth_is_not_trained_on() -> None:
+    scenes = tuple(replace(scene, has_truth=scene.name != "train-0") for scene in DATASET.scenes)
+    assert [scene.name for scene in training_scenes(Dataset("some", scenes))] == ["train-1"]
+
+
+def test_a_dataset_without_training_scenes_says_what_to_do() -> None:
+    with pytest.raises(UsageError, match=r"has no training scene: name a dataset .* --set training.dataset="):
+        training_scenes(DATASET.select(["test-0"]))
+
+
+def test_without_shipped_weights_one_is_told_to_train(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(product: str) -> Path:
+        raise StageError(f"no weights for {product}: train them with --train")
+
+    monkeypatch.setattr(shipped, "weights_file", none)
+    with pytest.raises(StageError, match="--train"):
+        graph(upto="costvolume")
+    assert set(counts(graph(upto="channels"))) == {"images", "channels"}, "nothing needs them up to here"
+
+
+def find(made: Graph, product: str, scene: str = "test-0") -> Step:
+    return next(step for step in made.steps.values() if (step.product, step.scene) == (product, scene))
+
+
+def test_what_is_left_open_is_filled_in_from_the_scene() -> None:
+    settings = find(graph(upto="costvolume"), "costvolume").settings
+    assert (settings["d_min"], settings["d_max"]) == (0, 8)
+    assert settings["precision"] in ("float32", "bfloat16")
+    assert settings["tiles"] == "32 rows, halo 5, edge"
+    assert set(settings) == {"d_min", "d_max", "precision", "tiles"}, "a guided volume's settings are in no other's key"
+
+
+def test_a_guided_volume_is_another_product() -> None:
+    exact, guided = (
+        find(graph(*settings, upto="costvolume"), "costvolume") for settings in ((), ("costvolume.mode=guided",))
+    )
+    assert exact.id != guided.id and guided.settings["mode"] == "guided"
+    assert guided.settings["tiles"] == "32 rows, halo 12, edge"
+
+
+def test_a_fast_volume_is_made_by_the_descriptor_net_alone() -> None:
+    made = graph("costvolume.mode=fast", upto="costvolume")
+    fast = find(made, "costvolume")
+    assert set(fast.inputs) == {"channels", "descriptor_net"} and fast.settings["tiles"] == "32 rows, halo 8, edge"
+    assert "matching_net" not in {step.product for step in made.steps.values()}
+    assert set(find(graph(upto="costvolume"), "costvolume").inputs) == {"channels", "matching_net"}
+
+
+def test_a_range_of_the_user_s_own_wins() -> None:
+    settings = find(graph("costvolume.d_min=-2", "costvolume.d_max=3", upto="costvolume"), "costvolume").settings
+    assert (settings["d_min"], settings["d_max"]) == (-2, 3)
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        pytest.param("costvolume.d_min=9", r"test-0.*d_max 8 lies below d_min 9", id="above the scene's own end"),
+        pytest.param(
+            "costvolume.d_max=80", "d_max is 80 px, but the image is only 80 px wide", id="wider than the image"
+        ),
+        pytest.param("costvolume.d_min=-100000", "d_min is -100000 px", id="far out on the other side"),
+    ],
+)
+def test_a_range_that_no_pixel_can_have_is_refused(setting: str, message: str) -> None:
+    with pytest.raises(UsageError, match=message) as caught:
+        graph(setting, upto="costvolume", dataset=DATASET.select(["test-0"]))
+    assert "\n" not in str(caught.value)
+
+
+def test_the_widest_range_that_a_pixel_can_have_is_taken() -> None:
+    settings = ("costvolume.d_min=-79", "costvolume.d_max=79")
+    assert find(graph(*settings, upto="costvolume"), "costvolume").settings["d_max"] == 79
+
+
+def test_ids_are_equal_for_equal_work_and_differ_else() -> None:
+    assert list(graph().steps) == list(graph().steps)
+    assert not set(graph("disparity.subpixel=true", upto="disparity").targets) & set(graph(upto="disparity").targets)
+
+
+def test_a_step_of_the_split_takes_one_input_a_scene() -> None:
+    made = graph(train=True)
+    step = find(made, "evaluation_net", SPLIT)
+    assert {name: len(ids) for name, ids in step.inputs.items()} == {
+        "evaluation_samples": 1,
+        "images": 2,
+        "disparity": 2,
+        "right_disparity": 2,
+    }
+    recipe = step.recipe({name: name for name in made.steps})
+    assert [made.steps[each].scene for each in recipe.inputs["images"]] == ["train-0", "train-1"]
+    assert isinstance(recipe.inputs["evaluation_samples"], str)
+
+
+@pytest.mark.parametrize("product", ["costvolume", "confidence"])
+def test_what_networks_say_does_not_depend_on_the_code_that_trains_them(product: str) -> None:
+    step = find(graph(upto=product, dataset=DATASET.select(["test-0"])), product)
+    assert not {"semidense.stages.learning.training", "semidense.stages.learning.optimiser"} & set(step.code)
+
+
+def test_the_order_of_training_scenes_is_part_of_the_key() -> None:
+    forward, backward = training_scenes(DATASET), training_scenes(DATASET)[::-1]
+    ids = [
+        build(Request(DATASET, {"": Config()}, "matching_net", True, scenes)).targets for scenes in (forward, backward)
+    ]
+    assert ids[0] != ids[1]
+
+
+def test_a_label_names_product_dataset_and_scene() -> None:
+    step = find(graph(), "disparity")
+    assert step.label == {"product": "disparity", "dataset": "synthetic", "scene": "test-0"}
+    assert step.name == "disparity of test-0"
+
+
+def test_no_path_is_in_a_key(make_pair: Callable[[Path], Path], tmp_path: Path) -> None:
+    made = [
+        build(Request(open_dataset(f"middlebury:{make_pair(tmp_path / place / 'pair')}"), {"": Config()}, "channels"))
+        for place in ("here", "there")
+    ]
+    assert list(made[0].steps) == list(made[1].steps)
+    assert str(tmp_path) not in repr([step.settings for step in made[0].steps.values()])
+
+
+def test_the_truth_s_key_holds_the_range() -> None:
+    scene: SceneSource = DATASET.scenes[0]
+    wider = replace(scene, disparities=replace(scene.disparities, maximum=9))
+    keys = [
+        next(iter(graph(upto="truth", dataset=Dataset("one", (each,))).steps.values())).settings
+        for each in (scene, wider)
+    ]
+    assert keys[0] != keys[1]
+
+
+def test_no_light_falls_on_other_channels_than_gray() -> None:
+    without_gray = 'channels.use=["rank", "companion"]'
+    with pytest.raises(UsageError, match="changes the light of the gray channel"):
+        graph(without_gray, train=True)
+    assert graph(without_gray, "matching_net.relight=0", train=True)
+    with pytest.raises(UsageError, match="set descriptor_net"):
+        graph(without_gray, "matching_net.relight=0", "costvolume.mode=fast", train=True)

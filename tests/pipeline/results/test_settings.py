@@ -1,0 +1,31 @@
+from dataclasses import dataclass
+
+import pytest
+
+from semidense.cache import Recipe
+from semidense.pipeline.results.settings import DEFAULTS, Belonging
+
+
+@dataclass(frozen=True)
+class Made:
+    """What is asked of an entry here."""
+
+    recipe: Recipe
+    key: str = "key"
+    digest: str = "digest"
+
+
+@pytest.mark.parametrize(
+    ("params", "text"),
+    [
+        pytest.param({"d_min": 0, "d_max": 9, "precision": "float32"}, DEFAULTS, id="what a run fills in by itself"),
+        pytest.param(
+            {"mode": "guided", "votes": 5},
+            "costvolume.mode=guided costvolume.votes=5",
+            id="a setting that the default's key does not have",
+        ),
+    ],
+)
+def test_the_settings_that_are_not_the_defaults_are_named(params: dict[str, object], text: str) -> None:
+    entry = Made(Recipe("costvolume", {}, params, {}, {}))
+    assert Belonging([entry]).text(entry) == text  # type: ignore[list-item, arg-type]

@@ -1,0 +1,47 @@
+import ctypes
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from semidense.stages.compute.allocator import keep_freed_memory
+
+ask = keep_freed_memory.__wrapped__
+
+
+def library(monkeypatch: pytest.MonkeyPatch, **functions: object) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setattr(ctypes, "CDLL", lambda _: SimpleNamespace(**functions))
+
+
+def test_tells_the_library_once_what_to_keep(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: dict[int, int] = {}
+
+    def mallopt(option: int, value: int) -> int:
+        told[option] = value
+        return 1
+
+    library(monkeypatch, mallopt=mallopt)
+    assert ask() is True
+    assert told == {-8: 1, -3: 32 * 2**20, -1: 2**31 - 1}, "one arena, the largest threshold, never trim"
+
+
+def test_says_when_a_setting_was_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    library(monkeypatch, mallopt=lambda option, _: int(option != -3))
+    assert ask() is False
+
+
+def test_a_library_without_the_function_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    library(monkeypatch)
+    assert ask() is False
+
+
+def test_other_systems_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    library(monkeypatch, mallopt=lambda *_: pytest.fail("nothing is to be called"))
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert ask() is False
+
+
+def test_is_harmless_here_and_asked_once() -> None:
+    assert keep_freed_memory() is keep_freed_memory()
+    assert keep_freed_memory.cache_info().currsize == 1
