@@ -7,8 +7,6 @@ from pathlib import Path
 from time import time
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from semidense.cache.document import plain_mapping
 from semidense.cache.entries import publish
 from semidense.cache.entries.check import Finding, Policy, inspect, read_record
@@ -128,6 +126,8 @@ class Store:
         Raises:
             EntryNotFound, DamagedEntry, InvalidKey, CacheUnavailable: as ``require`` does.
         """
+        import numpy as np
+
         return {name: np.asarray(array[...]) for name, array in self.arrays(key).items()}
 
     def _require(self, key: str) -> Finding:

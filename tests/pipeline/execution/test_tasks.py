@@ -56,7 +56,7 @@ def whole(context: Context, each: Step, *inputs: Made, forced: bool = False) -> 
 
 def test_a_product_is_begun_made_and_published(context: Context, seen: Seen) -> None:
     made = whole(context, step(RAMP, 5))
-    assert tasks.context.store.read(made.key)["values"][0].tolist() == [5, 6, 7, 8]
+    assert context.store.read(made.key)["values"][0].tolist() == [5, 6, 7, 8]
     assert seen.told == [("begun", "ramp", 1), ("advanced", "ramp", 1, 1, ""), ("published", "ramp", False)]
     entry = context.store.require(made.key)
     assert entry.label == {"product": "ramp", "dataset": "toys", "scene": "Toy"}
@@ -79,7 +79,7 @@ def test_a_tiled_product_is_written_tile_by_tile(context: Context) -> None:
     for rows in (Rows(8, 10, 10), Rows(0, 4, 10), Rows(4, 8, 10)):
         tasks.make_tile(context, job, rows)
     made = tasks.publish(context, job, [None] * 3)
-    values = tasks.context.store.read(made.key)["values"]
+    values = context.store.read(made.key)["values"]
     assert values[:3, 0].tolist() == [0 + 0 + 4, 0 + 4 + 8, 4 + 8 + 12]
     assert values[-1, 0] == 32 + 36 + 36
 
