@@ -22,7 +22,7 @@ from benchmarks.guided import Side, shipped_nets
 from benchmarks.harness import FOLDER, PAIRS, Ratio, compare, median_seconds, report, timed, write
 from benchmarks.peers import AccurateMatcher, PeerError
 from semidense.datasets import Scene, open_dataset
-from semidense.pipeline.plan.shipped_weights import read_shipped_weights
+from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
 from semidense.stages.baselines.declaration import SgmParams
 from semidense.stages.baselines.sgm import match_semi_global
 from semidense.stages.compute.precision import resolve
@@ -75,7 +75,7 @@ def main(
 
 
 def _volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float32]:
-    net = net_from_parameters(read_shipped_weights("matching_net", {})["parameters"], 3)
+    net = net_from_parameters(read_network(shipped_weights("matching_net", "exact"), {})["parameters"], 3)
     return cost_volume(net, channels(left, right), disparities, "auto")
 
 
@@ -87,7 +87,7 @@ def _guided_volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparitie
 
 
 def _fast_volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float32]:
-    net = descriptor_net_from_parameters(read_shipped_weights("descriptor_net", {})["parameters"], 3)
+    net = descriptor_net_from_parameters(read_network(shipped_weights("descriptor_net", "exact"), {})["parameters"], 3)
     return fast_cost_volume(net, channels(left, right), disparities, "auto")
 
 

@@ -19,7 +19,7 @@ from rich.table import Table
 
 from benchmarks.harness import PAIRS, Ratio, report, timed
 from semidense.datasets import SceneSource, open_dataset
-from semidense.pipeline.plan.shipped_weights import read_shipped_weights
+from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
 from semidense.stages.compute.precision import resolve
 from semidense.stages.compute.threads import one_thread
 from semidense.stages.disparity.winner_takes_all import winner_take_all
@@ -69,7 +69,7 @@ class Outcome:
 
 def shipped_nets() -> Nets:
     """Return the networks that a guided volume takes."""
-    return {net: read_shipped_weights(net, {}) for net in CostVolumeParams(mode="guided").inputs[1:]}
+    return {net: read_network(shipped_weights(net, "exact"), {}) for net in CostVolumeParams(mode="guided").inputs[1:]}
 
 
 def measure(scene: SceneSource, nets: Nets, rows: int, votes: int) -> Outcome:

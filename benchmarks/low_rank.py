@@ -17,7 +17,7 @@ from rich.table import Table
 from benchmarks.harness import write
 from benchmarks.precision import block_costs, middle_rows
 from semidense.datasets import SceneSource, open_dataset
-from semidense.pipeline.plan.shipped_weights import read_shipped_weights
+from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
 from semidense.stages.disparity.winner_takes_all import winner_take_all
 from semidense.stages.matching.net import MatchingNet, net_from_parameters
 from semidense.stages.metrics import raw_bad
@@ -60,7 +60,7 @@ def main(
     rows: Annotated[int, typer.Option(help="rows of each scene")] = 16,
 ) -> None:
     """Print and write the error and the multiplications of each rank."""
-    net = net_from_parameters(read_shipped_weights("matching_net", {})["parameters"], 3)
+    net = net_from_parameters(read_network(shipped_weights("matching_net", "exact"), {})["parameters"], 3)
     made = {each: truncated(net, each) for each in (*(rank or RANKS), FULL)}
     nets = {each: one for each, (one, _) in made.items()}
     scenes = [scene for scene in open_dataset(dataset).scenes if scene.has_truth]

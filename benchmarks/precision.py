@@ -17,7 +17,7 @@ from rich.table import Table
 
 from benchmarks.harness import timed
 from semidense.datasets import SceneSource, open_dataset
-from semidense.pipeline.plan.shipped_weights import read_shipped_weights
+from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
 from semidense.stages.compute.precision import Precision, fast_bfloat16
 from semidense.stages.disparity.winner_takes_all import winner_take_all
 from semidense.stages.matching.cost_volume import padded_cost_volume
@@ -70,7 +70,7 @@ def compare(
     out: Annotated[Path | None, typer.Option("--json", help="write the figures here")] = None,
 ) -> None:
     """Measure, print a table and write JSON."""
-    net = net_from_parameters(read_shipped_weights("matching_net", {})["parameters"], 3)
+    net = net_from_parameters(read_network(shipped_weights("matching_net", "exact"), {})["parameters"], 3)
     found = [measure(scene, net, rows) for scene in open_dataset(dataset).scenes if scene.has_truth]
     mean = {name: float(np.mean([row[name] for row in found])) for name in found[0] if name != "scene"}
     table = Table("scene", *mean, box=None)

@@ -17,7 +17,7 @@ from rich.table import Table
 
 from benchmarks.harness import timed, write
 from semidense.pipeline.api import Task, run
-from semidense.pipeline.plan.steps import PRODUCTS
+from semidense.pipeline.plan.steps import products
 
 PICTURE = Path("docs/pictures/timeline.png")
 SCENE = "synthetic:train=0,test=1,height=240,width=320,disparities=24"
@@ -56,7 +56,7 @@ def _seconds(results: Sequence[Any]) -> dict[str, tuple[int, float]]:
     found: dict[str, list[float]] = defaultdict(list)
     for each in results:
         found[product_of(each.key)].append(each.end_time - each.start_time)
-    return {name: (len(found[name]), sum(found[name])) for name in PRODUCTS if name in found}
+    return {name: (len(found[name]), sum(found[name])) for name in products() if name in found}
 
 
 def _draw(results: Sequence[Any], resources: Sequence[Any], dataset: str, path: Path) -> None:

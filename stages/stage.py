@@ -108,6 +108,9 @@ class Stage:
             parameters: its arrays exist before its first tile.
         monitored: long work, which reports progress and can resume.
         needs: distributions beside the core ones; their versions enter the key.
+        learnt: its result is learnt from training scenes, and may come as a file of weights instead.
+        cross_fitted: of a split stage: each training scene comes as networks of other scenes score it. Its settings
+            have ``folds`` and ``fold_of_scene``.
     """
 
     product: str
@@ -122,6 +125,8 @@ class Stage:
     sizes: Callable[[Any], Mapping[str, int]] = lambda _: {}
     monitored: bool = False
     needs: tuple[str, ...] = ()
+    learnt: bool = False
+    cross_fitted: bool = False
 
     @property
     def module(self) -> str:

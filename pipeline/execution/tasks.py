@@ -108,13 +108,13 @@ def make_tile(context: Context, job: Job, rows: Rows) -> None:
     step = job.step
     with explained(step, str(rows)):
         inputs = {
-            product: read_block(context.store.arrays(keys[0]), rows, step.stage, step.argument)
+            product: read_block(context.store.arrays(keys[0]), rows, step.stage, step.params)
             for product, keys in job.inputs.items()
         }
         made = step.stage.function()(step.argument, inputs)
         if step.stage.border == "cut":
             dims = {output.name: output.dims for output in step.stage.outputs}
-            made = trim(made, dims, rows, step.stage.halo(step.argument))
+            made = trim(made, dims, rows, step.stage.halo(step.params))
         for output in step.stage.outputs:
             _write_tile(job.draft, output, made[output.name], rows)
     context.watch.advanced(step, 1, len_tiles(step), "")
@@ -131,8 +131,8 @@ def create_arrays(job: Job) -> Job:
     """Create the arrays of a tiled product, whose sizes are known beforehand."""
     if job.draft is None or job.step.size is None:
         return job
-    stage, argument = job.step.stage, job.step.argument
-    sizes = {"y": job.step.size[0], "x": job.step.size[1], **stage.sizes(argument)}
+    stage, params = job.step.stage, job.step.params
+    sizes = {"y": job.step.size[0], "x": job.step.size[1], **stage.sizes(params)}
     with explained(job.step):
         for output in stage.outputs:
             shape = [sizes[dim] for dim in output.dims]

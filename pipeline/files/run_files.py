@@ -36,8 +36,8 @@ from semidense.pipeline.files.file_names import safe_names
 from semidense.pipeline.files.selection import Wanted, lineage, wanted
 from semidense.pipeline.files.writing import explaining, save_png, writable_folder, write_rgb
 from semidense.pipeline.plan.plan import Made
-from semidense.pipeline.plan.steps import LEARNT
 from semidense.pipeline.results.metric_rows import SWEEP_THRESHOLD
+from semidense.stages.catalog import STAGES
 from semidense.stages.metrics.stage import ROW
 
 COLUMNS = ("scene", "method", "mask", "threshold_px", "R", "pixels", *ROW)
@@ -84,13 +84,13 @@ class _Exporter:
 
     def __post_init__(self) -> None:
         """Find what there is, and name the scenes' folders."""
-        self.found = wanted(self.result, (*_MAPS, *LEARNT))
+        self.found = wanted(self.result, (*_MAPS, *_learnt()))
         self.scenes = safe_names(self.result.made[step_id].step.scene for step_id, _ in self.result.plan.targets)
 
     def write_networks(self) -> None:
         """Write the trained networks and their calibration; shipped ones are files already."""
         for each in self.found:
-            if each.product in LEARNT and each.made.step.inputs:
+            if each.product in _learnt() and each.made.step.inputs:
                 self._write(self.folder / f"{each.stem}.safetensors", _weights(self.result, each.made))
 
     def write_maps(self) -> None:
@@ -150,6 +150,10 @@ class _Exporter:
         with explaining(path), atomic_write(path) as file:
             file.write(data)
         self.written.append(path)
+
+
+def _learnt() -> list[str]:
+    return [stage.product for stage in STAGES.values() if stage.learnt]
 
 
 def _weights(result: Result, made: Made) -> bytes:

@@ -1,38 +1,26 @@
-"""The configuration: one tree, one section a product, every field with its range and default.
+"""The configuration: one section a product, every field with its range and default.
 
-Sources, later ones win: the defaults, a TOML file, ``section.field=value`` settings.
+The sections are those of the stages' own ``Params``, of stages from other packages too. Sources, later ones win: the
+defaults, a TOML file, ``section.field=value`` settings.
 """
 
 import difflib
 import json
 import tomllib
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from semidense.pipeline.plan.errors import UsageError
-from semidense.stages.baselines.declaration import (
-    CcnnParams,
-    CheckedParams,
-    CostConfidenceParams,
-    ForestParams,
-    SgmParams,
-    WindowParams,
-)
-from semidense.stages.disparity.declaration import DisparityParams, RefinedParams
-from semidense.stages.evaluation.calibration.declaration import CalibrationParams
-from semidense.stages.evaluation.declaration import ConfidenceParams, EvaluationNetParams, EvaluationSamplesParams
-from semidense.stages.evaluation.filtering import SemidenseParams
-from semidense.stages.matching.declaration import (
-    CostVolumeParams,
-    DescriptorNetParams,
-    MatchingNetParams,
-    MatchingSamplesParams,
-)
+from semidense.stages.catalog import STAGES
 from semidense.stages.stage import NoParams, Params
-from semidense.stages.transforms.declaration import ChannelsParams
+
+P = TypeVar("P", bound=Params)
+CHOICES = ("weights", "use")
+"""Sections with a field a product, each empty by default."""
 
 
 class TrainingParams(Params):
@@ -47,38 +35,46 @@ class TrainingParams(Params):
 
 
 class Config(BaseModel):
-    """Everything that can be set, by product."""
+    """Everything that can be set. ``Config.load`` makes one: it has a section for each product that has settings.
+
+    Beside the products' sections, ``training`` says what is learnt from, ``weights.PRODUCT`` names a file whose weights
+    take the place of the package's, and ``use.PRODUCT=OTHER`` makes a product by the stage of another one.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
 
     training: TrainingParams = TrainingParams()
-    channels: ChannelsParams = ChannelsParams()
-    matching_samples: MatchingSamplesParams = MatchingSamplesParams()
-    matching_net: MatchingNetParams = MatchingNetParams()
-    descriptor_net: DescriptorNetParams = DescriptorNetParams()
-    costvolume: CostVolumeParams = CostVolumeParams()
-    disparity: DisparityParams = DisparityParams()
-    evaluation_samples: EvaluationSamplesParams = EvaluationSamplesParams()
-    evaluation_net: EvaluationNetParams = EvaluationNetParams()
-    confidence: ConfidenceParams = ConfidenceParams()
-    calibration: CalibrationParams = CalibrationParams()
-    semidense: SemidenseParams = SemidenseParams()
-    refined: RefinedParams = RefinedParams()
-    sgm: SgmParams = SgmParams()
-    census: WindowParams = WindowParams()
-    sncc: WindowParams = WindowParams()
-    mc_cnn: CheckedParams = CheckedParams()
-    mc_cnn_accurate: CheckedParams = CheckedParams()
-    cost_confidence: CostConfidenceParams = CostConfidenceParams()
-    o1_forest: ForestParams = ForestParams()
-    ccnn_net: CcnnParams = CcnnParams()
 
     def section(self, product: str) -> Params:
         """Return the settings of a product; those of a product without any are empty."""
-        return getattr(self, product, NoParams())
+        found: Params = getattr(self, product, NoParams())
+        return found
 
-    @classmethod
-    def load(cls, file: Path | None = None, settings: Iterable[str] = ()) -> Self:
+    def of(self, product: str, kind: type[P]) -> P:
+        """Return the settings of a product whose declaration is known.
+
+        Raises:
+            TypeError: if they are of another kind.
+        """
+        found = self.section(product)
+        if not isinstance(found, kind):
+            raise TypeError(f"the settings of {product} are {type(found).__name__}, not {kind.__name__}")
+        return found
+
+    def choice(self, section: str, product: str) -> str | None:
+        """Return what one of ``CHOICES`` names for a product; None if nothing was chosen."""
+        found: str | None = getattr(getattr(self, section), product, None)
+        return found
+
+    def to_dict(self) -> dict[str, dict[str, Any]]:
+        """Return all settings by section, as plain JSON types; of ``CHOICES`` those that were made."""
+        return {
+            name: getattr(self, name).model_dump(mode="json", exclude_none=name in CHOICES)
+            for name in type(self).model_fields
+        }
+
+    @staticmethod
+    def load(file: Path | None = None, settings: Iterable[str] = ()) -> "Config":
         """Return the configuration that a TOML file and ``section.field=value`` settings describe.
 
         Raises:
@@ -88,11 +84,34 @@ class Config(BaseModel):
         tree = _read_toml(file) if file else {}
         for setting in settings:
             _merge(tree, setting)
-        _refuse_unknown(tree)
+        model = _model(tuple(STAGES))
+        _refuse_unknown(tree, model)
         try:
-            return cls.model_validate(tree)
+            return model.model_validate(tree)
         except ValidationError as error:
             raise UsageError(one_line(error)) from None
+
+
+@cache
+def _model(products: tuple[str, ...]) -> type[Config]:
+    """Return the model with a section for each of the products that has settings, and the sections of choices."""
+    stages = [STAGES[product] for product in products]
+    sections = {stage.product: stage.params for stage in stages if stage.params is not NoParams}
+    sections["weights"] = _choices("weights", [stage.product for stage in stages if stage.learnt])
+    sections["use"] = _choices("use", products)
+    fields: dict[str, Any] = {name: (kind, kind()) for name, kind in sections.items()}
+    return create_model("Config", __base__=Config, **fields)
+
+
+def _choices(name: str, products: Iterable[str]) -> type[Params]:
+    told = {
+        "weights": "file with the weights of {}; default: those that come with the package",
+        "use": "product whose stage makes {} instead of its own",
+    }[name]
+    fields: dict[str, Any] = {
+        product: (str | None, Field(None, description=told.format(product))) for product in products
+    }
+    return create_model(name, __base__=Params, **fields)
 
 
 def _read_toml(file: Path) -> dict[str, Any]:
@@ -132,12 +151,12 @@ def parse_value(text: str) -> object:
         return text.split(",") if "," in text else text
 
 
-def _refuse_unknown(tree: Mapping[str, Any]) -> None:
+def _refuse_unknown(tree: Mapping[str, Any], model: type[Config]) -> None:
     """Refuse the first unknown section or field, naming the nearest that exists."""
     for section, fields in tree.items():
-        if section not in Config.model_fields:
-            raise UsageError(f"configuration: no section {section!r}; {nearest(section, Config.model_fields)}")
-        known = type(getattr(Config(), section)).model_fields
+        if section not in model.model_fields:
+            raise UsageError(f"configuration: no section {section!r}; {nearest(section, model.model_fields)}")
+        known = model.model_fields[section].annotation.model_fields  # type: ignore[union-attr]
         if not isinstance(fields, Mapping):
             raise UsageError(f"configuration: [{section}] must be a table of fields, not {fields!r}")
         for field in fields:

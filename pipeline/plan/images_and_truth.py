@@ -5,6 +5,10 @@ and a source file that changes makes stale exactly what depends on it. Their fun
 ``SceneSource`` to read where those of the stages are given their settings.
 """
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,6 +42,28 @@ TRUTH = Stage(
     ),
     compute="semidense.pipeline.plan.images_and_truth:read_truth",
 )
+
+
+@dataclass(frozen=True)
+class Source:
+    """A product that is read from a scene.
+
+    Attributes:
+        stage: its declaration.
+        identity: names the content that it is read from, for the key.
+    """
+
+    stage: Stage
+    identity: Callable[[SceneSource], Mapping[str, Any]]
+
+
+def _truth_identity(scene: SceneSource) -> dict[str, Any]:
+    bounds = [scene.disparities.minimum, scene.disparities.maximum]
+    return scene.truth_identity() | {"range": bounds}
+
+
+SOURCES = {"images": Source(IMAGES, SceneSource.image_identity), "truth": Source(TRUTH, _truth_identity)}
+"""By product."""
 
 
 def read_images(scene: SceneSource, _: Inputs) -> dict[str, Array]:

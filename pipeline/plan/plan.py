@@ -14,7 +14,7 @@ from semidense.cache import ABSENT, Change, Entry, Recipe, Store, differences
 from semidense.pipeline.plan.causes import PENDING, Causes
 from semidense.pipeline.plan.config import nearest
 from semidense.pipeline.plan.errors import UsageError
-from semidense.pipeline.plan.steps import ALL_PRODUCTS, Graph, Request, Step, build
+from semidense.pipeline.plan.steps import Graph, Request, Step, build, products
 
 State = Literal["hit", "made", "stale", "missing"]
 
@@ -89,9 +89,9 @@ def make_plan(request: Request, store: Store, forced: Iterable[str] = ()) -> Pla
         UsageError, DatasetError, StageError: if the request cannot be carried out.
         CacheUnavailable: if the cache cannot be read.
     """
-    unknown = sorted(set(forced) - set(ALL_PRODUCTS))
+    unknown = sorted(set(forced) - set(products()))
     if unknown:
-        raise UsageError(f"no product {unknown[0]!r} to force; {nearest(unknown[0], ALL_PRODUCTS)}")
+        raise UsageError(f"no product {unknown[0]!r} to force; {nearest(unknown[0], products())}")
     return plan_graph(build(request), store, forced)
 
 

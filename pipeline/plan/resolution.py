@@ -9,6 +9,7 @@ from semidense.pipeline.plan.config import Config, one_line
 from semidense.pipeline.plan.errors import UsageError
 from semidense.stages.compute.precision import resolve
 from semidense.stages.stage import Params
+from semidense.stages.transforms.declaration import ChannelsParams
 
 
 def resolved(params: Params, scene: SceneSource | None) -> Params:
@@ -43,7 +44,7 @@ def require_trainable(config: Config, product: str) -> None:
     Raises:
         UsageError: if the product's ``relight`` is on and ``channels.use`` leaves gray out.
     """
-    if getattr(config.section(product), "relight", 0) and "gray" not in config.channels.use:
+    if getattr(config.section(product), "relight", 0) and "gray" not in config.of("channels", ChannelsParams).use:
         raise UsageError(
             f"{product}.relight changes the light of the gray channel, which channels.use leaves out: "
             f"set {product}.relight=0"

@@ -1,26 +1,78 @@
-"""The weights that come with the package: products that stand in for trained networks and their calibration."""
+"""Weights that stand in for trained networks and their calibration: those of the package, or a user's file."""
 
 import hashlib
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
+from pathlib import Path
 
 from semidense.stages.catalog import STAGES
 from semidense.stages.matching.declaration import Mode
 from semidense.stages.stage import Array, Inputs, Stage, StageError
 
-WEIGHTS = {
-    product: Stage(
-        product=product,
-        inputs=(),
-        outputs=stage.outputs,
-        compute=f"{__name__}:read_shipped_{'table' if product == 'calibration' else 'weights'}",
-    )
-    for product, stage in STAGES.items()
-    if product in ("matching_net", "descriptor_net", "evaluation_net", "calibration")
-}
 _LEARNT_FROM_MAPS = ("evaluation_net", "calibration")
 """Products of which those for guided volumes are others: the errors of such maps hang together."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """A file of weights.
+
+    Attributes:
+        product: what it stands in for.
+        name: of the package's file; empty for a user's own.
+        file: the user's own file.
+        digest: sha256 of its bytes.
+    """
+
+    product: str
+    name: str
+    file: Path | None
+    digest: str
+
+    def read(self) -> bytes:
+        """Return the bytes that the digest is of.
+
+        Raises:
+            StageError: if the file cannot be read, or has changed since the run was planned.
+        """
+        data = _bytes_of(self.product, self.file) if self.file else weights_file(self.name).read_bytes()
+        if hashlib.sha256(data).hexdigest() != self.digest:
+            raise StageError(f"{self.file or self.name}: the weights have changed since the run was planned; run again")
+        return data
+
+
+def weights_stage(product: str) -> Stage:
+    """Return the stage that reads a learnt product from a file instead of learning it."""
+    form = "table" if product == "calibration" else "network"
+    return Stage(product, (), STAGES[product].outputs, f"{__name__}:read_{form}")
+
+
+def shipped_weights(product: str, mode: Mode) -> Weights:
+    """Return the package's weights of a product for volumes of a mode.
+
+    Raises:
+        StageError: if this installation has none.
+    """
+    name = weights_name(product, mode)
+    return Weights(product, name, None, weights_digest(name))
+
+
+def own_weights(product: str, file: Path) -> Weights:
+    """Return the weights in a user's file.
+
+    Raises:
+        StageError: if it cannot be read.
+    """
+    return Weights(product, "", file, hashlib.sha256(_bytes_of(product, file)).hexdigest())
+
+
+def _bytes_of(product: str, file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise StageError(f"weights.{product} = {file}: {error.strerror or error}") from None
 
 
 def weights_name(product: str, mode: Mode) -> str:
@@ -50,18 +102,18 @@ def weights_digest(name: str) -> str:
     return hashlib.sha256(weights_file(name).read_bytes()).hexdigest()
 
 
-def read_shipped_weights(name: str, _: Inputs) -> dict[str, Array]:
-    """Return a shipped network as its training left it, checked."""
+def read_network(weights: Weights, _: Inputs) -> dict[str, Array]:
+    """Return a network as its training left it, checked."""
     from semidense.stages.weights import read_weights
 
-    return {**read_weights(_product(name), weights_file(name).read_bytes())}
+    return {**read_weights(weights.product, weights.read())}
 
 
-def read_shipped_table(name: str, _: Inputs) -> dict[str, Array]:
-    """Return the shipped calibration, checked."""
-    from semidense.stages.weights.tables import read_table
+def read_table(weights: Weights, _: Inputs) -> dict[str, Array]:
+    """Return a calibration, checked."""
+    from semidense.stages.weights import tables
 
-    return read_table(weights_file(name).read_bytes())
+    return tables.read_table(weights.read())
 
 
 def _missing(name: str) -> str:
@@ -74,7 +126,3 @@ def _missing(name: str) -> str:
         "no calibration of such volumes comes with this installation: a wanted error and calibrated probabilities need "
         f"one; `make calibration DATA=DIR{of_mode}` makes it from Middlebury's training scenes"
     )
-
-
-def _product(name: str) -> str:
-    return name.partition(".")[0]

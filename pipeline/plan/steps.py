@@ -8,31 +8,40 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from semidense.cache import Recipe, code_parts
 from semidense.datasets import Dataset, SceneSource
-from semidense.pipeline.plan import images_and_truth as sources
-from semidense.pipeline.plan import shipped_weights as shipped
 from semidense.pipeline.plan.config import Config, nearest
 from semidense.pipeline.plan.environment import environment
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.images_and_truth import SOURCES, Source
 from semidense.pipeline.plan.resolution import require_trainable, resolved
+from semidense.pipeline.plan.shipped_weights import Weights, own_weights, shipped_weights, weights_stage
 from semidense.pipeline.plan.training_split import outside, with_folds
-from semidense.stages.catalog import CATALOG, STAGES
-from semidense.stages.stage import Stage
+from semidense.stages.catalog import READ, STAGES
+from semidense.stages.evaluation.calibration.declaration import CalibrationParams
+from semidense.stages.evaluation.filtering import SemidenseParams
+from semidense.stages.matching.declaration import CostVolumeParams
+from semidense.stages.stage import NoParams, Params, Stage
 
-PACKAGES = ("semidense",)
 NETS = ("matching_net", "descriptor_net", "evaluation_net")
 """Products that are networks."""
-LEARNT = tuple(shipped.WEIGHTS)
-"""Products that come with the package, unless one trains."""
-PRODUCTS = ("images", "truth", *(stage.product for stage in CATALOG))
-"""The products of the dataflow, in order."""
-ALL_PRODUCTS = ("images", "truth", *STAGES)
-"""They and the baselines, in order; the names that ``--upto`` takes."""
 SPLIT = "training split"
 """Stands for a scene in steps that belong to all training scenes together."""
+Argument = Params | SceneSource | Weights
+"""What the function of a step is given first: its settings, or what it reads."""
+
+
+def products() -> tuple[str, ...]:
+    """Return the names that ``--upto`` takes, in an order in which each comes after those it is made from."""
+    return (*READ, *STAGES)
+
+
+def place(product: str) -> int:
+    """Return where a product stands in that order; one whose package is not installed any more stands last."""
+    return [*products(), product].index(product)
 
 
 @dataclass(frozen=True)
@@ -44,7 +53,7 @@ class Step:
         stage: its declaration.
         scene: the scene's name, or ``SPLIT``.
         dataset: the scene's dataset, without a path.
-        argument: what its function is given first: settings, or the source to read.
+        argument: what its function is given first: its settings, or what it reads.
         settings: the part of the key that says how: plain JSON.
         inputs: ids of the steps it is made from, by product; of a split step, one a training scene.
         size: rows and columns of the image; None for a split step.
@@ -57,7 +66,7 @@ class Step:
     stage: Stage
     scene: str
     dataset: str
-    argument: Any
+    argument: Argument
     settings: Mapping[str, Any]
     inputs: Mapping[str, tuple[str, ...]]
     size: tuple[int, int] | None
@@ -69,6 +78,11 @@ class Step:
     def product(self) -> str:
         """The name of its product."""
         return self.stage.product
+
+    @property
+    def params(self) -> Params:
+        """Its settings; those of a product that is read are empty."""
+        return self.argument if isinstance(self.argument, Params) else NoParams()
 
     @property
     def label(self) -> dict[str, str]:
@@ -138,8 +152,8 @@ class Request:
 
     def __post_init__(self) -> None:
         """Refuse a product that does not exist."""
-        if self.upto not in ALL_PRODUCTS:
-            raise UsageError(f"no product {self.upto!r}; {nearest(self.upto, ALL_PRODUCTS)}")
+        if self.upto not in products():
+            raise UsageError(f"no product {self.upto!r}; {nearest(self.upto, products())}")
 
 
 def build(request: Request) -> Graph:
@@ -154,8 +168,7 @@ def build(request: Request) -> Graph:
     for variant, config in request.configs.items():
         builder = _Builder(graph, config, request)
         graph.targets += [(step_id, variant) for step_id in _targets(builder, trained_on)]
-    # The order of the products is one in which each comes after its inputs, whichever scenes they belong to.
-    graph.steps = dict(sorted(graph.steps.items(), key=lambda item: ALL_PRODUCTS.index(item[1].product)))
+    graph.steps = dict(sorted(graph.steps.items(), key=lambda item: place(item[1].product)))
     graph.notes = list(dict.fromkeys(graph.notes))
     if not graph.targets:
         raise UsageError(f"{request.dataset.spec}: no scene is left to work on; {'; '.join(graph.notes)}")
@@ -171,16 +184,30 @@ def _targets(builder: "_Builder", trained_on: Sequence[Mapping[str, Any]]) -> It
     for scene in builder.request.dataset.scenes:
         if scene.image_identity() in trained_on:
             notes.append(f"{scene.name} is a training scene: it is left out, since nothing is tested on it")
-        elif upto in ("truth", "metrics") and not scene.has_truth:
-            notes.append(f"{scene.name} has no ground truth: there are no metrics for it")
-            yield builder.product("images" if upto == "truth" else _known(scene, "semidense", notes), scene)
+        elif not scene.has_truth and "truth" in made_from(upto):
+            notes.append(f"{scene.name} has no ground truth: no {upto} can be made for it")
+            yield builder.product(_known(scene, _without_truth(upto), notes), scene)
         else:
             yield from (builder.product(_known(scene, each, notes), scene) for each in (upto, *builder.request.also))
 
 
+def made_from(product: str) -> frozenset[str]:
+    """Return a product of a scene and all that it is made from; what is learnt from other scenes is left out."""
+    stage = STAGES.get(product)
+    inputs = stage.inputs if stage and stage.scope == "scene" else ()
+    return frozenset({product}).union(*(made_from(each) for each in inputs))
+
+
 def needs_range(product: str) -> bool:
-    """Return whether a product of a scene is made from costs, for which its range of disparities must be known."""
-    return product != "truth" and ALL_PRODUCTS.index(product) >= ALL_PRODUCTS.index("costvolume")
+    """Return whether the range of disparities must be known for a product of a scene."""
+    stages = (STAGES[each] for each in made_from(product) if each in STAGES)
+    return any("d_min" in stage.params.model_fields for stage in stages)
+
+
+def _without_truth(product: str) -> str:
+    """Return the last product on the way to one that needs a truth which can be made without it."""
+    ways = [each for each in products() if each in made_from(product) and "truth" not in made_from(each)]
+    return ways[-1] if ways else READ[0]
 
 
 def _known(scene: SceneSource, product: str, notes: list[str]) -> str:
@@ -216,70 +243,91 @@ class _Builder:
         return self.known[asked]
 
     def _add_product(self, product: str, scene: SceneSource | None) -> str:
-        if product == "images" and scene:
-            return self._add_source(sources.IMAGES, scene, scene.image_identity())
-        if product == "truth" and scene:
-            bounds = [scene.disparities.minimum, scene.disparities.maximum]
-            return self._add_source(sources.TRUTH, scene, scene.truth_identity() | {"range": bounds})
-        trained = self.request.train and product not in self.config.training.shipped
-        if product in LEARNT and not trained:
-            return self._add_shipped(product)
-        if product == "calibration":
-            return self._calibration()
-        stage = STAGES[product]
+        if product in SOURCES and scene:
+            return self._add_source(SOURCES[product], scene)
+        if product not in STAGES:
+            raise UsageError(f"{product} is read from a scene: name a dataset")
+        if STAGES[product].learnt and (weights := self._weights(product)):
+            return self._add(weights_stage(product), None, weights, {"shipped": weights.digest}, {})
+        if STAGES[product].cross_fitted:
+            return self._add_cross_fitted(product)
+        stage, params = self._chosen(product)
         if "channels" in stage.inputs:
             require_trainable(self.config, product)
-        needed = getattr(self.config.section(product), "inputs", stage.inputs)
+        needed = getattr(params, "inputs", stage.inputs)
         inputs = {name: self._inputs(stage, name, scene) for name in stage.inputs if name in needed}
-        return self._add_stage(stage, scene, inputs)
+        return self._add_stage(stage, params, scene, inputs)
+
+    def _weights(self, product: str) -> Weights | None:
+        """Return the file that stands in for learning a product; None if it is learnt."""
+        if file := self.config.choice("weights", product):
+            return own_weights(product, Path(file).expanduser())
+        if self.request.train and product not in self.config.training.shipped:
+            return None
+        return shipped_weights(product, self.config.of("costvolume", CostVolumeParams).mode)
+
+    def _chosen(self, product: str) -> tuple[Stage, Params]:
+        """Return the stage that makes a product, and its settings: its own, or the one that ``use`` names.
+
+        Raises:
+            UsageError: if that one makes something else, or is made from the product itself.
+        """
+        other = self.config.choice("use", product) or product
+        if other not in STAGES:
+            raise UsageError(f"use.{product} = {other!r}: no product {other!r}; {nearest(other, STAGES)}")
+        stage, own = STAGES[other], STAGES[product]
+        arrays = {output.name: output.dims for output in stage.outputs}
+        missing = [output.name for output in own.outputs if arrays.get(output.name) != output.dims]
+        if missing or stage.scope != own.scope or (other != product and product in made_from(other)):
+            why = f"it has no array {missing[0]!r} with its dimensions" if missing else f"it is made from {product}"
+            raise UsageError(f"use.{product} = {other!r}: {other} cannot take the place of {product}, {why}")
+        return replace(stage, product=product), self.config.section(other)
 
     def _inputs(self, stage: Stage, product: str, scene: SceneSource | None) -> tuple[str, ...]:
         if stage.scope == "split" and _scope(product) == "scene":
             return tuple(self.product(product, source) for source in self.request.training)
         return (self.product(product, scene),)
 
-    def _calibration(self) -> str:
-        """Add the calibration, for which all networks that score a training scene learnt from other folds."""
+    def _add_cross_fitted(self, product: str) -> str:
+        """Add a product of all training scenes, each scored by networks that learnt from other folds."""
         scenes = self.request.training
         config = with_folds(self.config, [scene.name for scene in scenes])
-        folds = config.calibration.fold_of_scene or ()
+        params = config.of(product, CalibrationParams)
+        folds = params.fold_of_scene or ()
         requests = {fold: replace(self.request, training=outside(scenes, folds, fold)) for fold in set(folds)}
         builders = {fold: replace(self, config=config, request=requests[fold], known={}) for fold in requests}
-        stage = STAGES["calibration"]
+        stage = STAGES[product]
         inputs = {
             name: tuple(builders[fold].product(name, scene) for scene, fold in zip(scenes, folds, strict=True))
             for name in stage.inputs
         }
-        return replace(self, config=config)._add_stage(stage, None, inputs)
+        return replace(self, config=config)._add_stage(stage, params, None, inputs)
 
-    def _add_source(self, stage: Stage, scene: SceneSource, identity: Mapping[str, Any]) -> str:
-        code = code_parts(stage.module, PACKAGES) | code_parts(scene.reader, PACKAGES)
-        return self._add(stage, scene, scene, identity, {}, code)
+    def _add_source(self, source: Source, scene: SceneSource) -> str:
+        return self._add(source.stage, scene, scene, source.identity(scene), {}, scene.reader)
 
-    def _add_shipped(self, product: str) -> str:
-        stage, name = shipped.WEIGHTS[product], shipped.weights_name(product, self.config.costvolume.mode)
-        settings = {"shipped": shipped.weights_digest(name)}
-        return self._add(stage, None, name, settings, {}, code_parts(stage.module, PACKAGES))
-
-    def _add_stage(self, stage: Stage, scene: SceneSource | None, inputs: Mapping[str, tuple[str, ...]]) -> str:
-        params = resolved(self.config.section(stage.product), scene)
+    def _add_stage(
+        self, stage: Stage, params: Params, scene: SceneSource | None, inputs: Mapping[str, tuple[str, ...]]
+    ) -> str:
+        params = resolved(params, scene)
         settings = params.model_dump(mode="json") | {"tiles": stage.tiling(params)}
-        return self._add(stage, scene, params, settings, inputs, code_parts(stage.module, PACKAGES))
+        return self._add(stage, scene, params, settings, inputs)
 
     def _add(
         self,
         stage: Stage,
         scene: SceneSource | None,
-        argument: object,
+        argument: Argument,
         settings: Mapping[str, Any],
         inputs: Mapping[str, tuple[str, ...]],
-        code: Mapping[str, str],
+        *modules: str,
     ) -> str:
         name, dataset, size = (scene.name, scene.dataset, scene.size) if scene else (SPLIT, SPLIT, None)
         identity = json.dumps([stage.product, name, dataset, size, settings, inputs], sort_keys=True)
         step_id = hashlib.sha256(identity.encode()).hexdigest()[:16]
         if step_id not in self.graph.steps:
-            filtered = stage.product in ("semidense", "metrics") and self.config.semidense.by_R
+            semidense = self.config.of("semidense", SemidenseParams)
+            filtered = semidense.by_R and "semidense" in (stage.product, *stage.inputs)
             self.graph.steps[step_id] = Step(
                 id=step_id,
                 stage=stage,
@@ -289,8 +337,14 @@ class _Builder:
                 settings=dict(settings),
                 inputs=dict(inputs),
                 size=size,
-                code=dict(code),
+                code=_code(stage.module, *modules),
                 environment=environment(stage),
-                R=self.config.semidense.R if filtered else None,
+                R=semidense.R if filtered else None,
             )
         return step_id
+
+
+def _code(*modules: str) -> dict[str, str]:
+    """Return the hashes of modules and of all that they import from this package or their own."""
+    packages = ("semidense", *(module.partition(".")[0] for module in modules))
+    return {name: part for module in modules for name, part in code_parts(module, tuple(sorted({*packages}))).items()}

@@ -6,6 +6,10 @@ from typing import TypeVar
 from semidense.datasets import Dataset, SceneSource
 from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.errors import UsageError
+from semidense.stages.catalog import STAGES
+from semidense.stages.evaluation.calibration.declaration import CalibrationParams
+from semidense.stages.learning.schedule import Schedule
+from semidense.stages.stage import Params
 
 _Scene = TypeVar("_Scene")
 
@@ -34,7 +38,7 @@ def with_folds(config: Config, names: Sequence[str]) -> Config:
     Raises:
         UsageError: if the folds that are set do not fit the scenes, or there are fewer scenes than folds.
     """
-    params = config.calibration
+    params = config.of("calibration", CalibrationParams)
     folds = params.fold_of_scene or assign_folds(names, params.folds)
     if len(folds) != len(names) or len(set(folds)) < 2:
         raise UsageError(
@@ -42,10 +46,14 @@ def with_folds(config: Config, names: Sequence[str]) -> Config:
             "training scenes, and it takes two folds at least"
         )
     share = 1 - 1 / len(set(folds))
-    nets = {name: getattr(config, name) for name in ("matching_net", "descriptor_net", "evaluation_net")}
-    update = {name: net.model_copy(update={"steps": max(1, round(net.steps * share))}) for name, net in nets.items()}
+    sections = {stage.product: config.section(stage.product) for stage in STAGES.values() if stage.learnt}
+    nets = {name: net for name, net in sections.items() if isinstance(net, Schedule)}
+    update: dict[str, Params] = {
+        name: net.model_copy(update={"steps": max(1, round(net.steps * share))}) for name, net in nets.items()
+    }
     update["calibration"] = params.model_copy(update={"fold_of_scene": folds})
     update["training"] = config.training.model_copy(update={"shipped": ()})
+    update["weights"] = type(config.section("weights"))()
     return config.model_copy(update=update)
 
 

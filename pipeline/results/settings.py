@@ -34,7 +34,7 @@ class Belonging:
 
 def _own(entry: Entry) -> Iterable[str]:
     """Yield the entry's own settings that were chosen; what a run fills in by itself has an open default."""
-    defaults = to_jsonable_python(dict(Config().section(entry.recipe.stage)))  # those that no key has, too
+    defaults = to_jsonable_python(dict(Config.load().section(entry.recipe.stage)))  # those that no key has, too
     for name, value in entry.recipe.params.items():
         if name in defaults and defaults[name] not in (None, "auto", value):
             yield f"{entry.recipe.stage}.{name}={_text(value)}"

@@ -91,6 +91,7 @@ EVALUATION_NET = Stage(
     params=EvaluationNetParams,
     scope="split",
     monitored=True,
+    learnt=True,
 )
 
 CONFIDENCE = Stage(

@@ -157,6 +157,7 @@ MATCHING_NET = Stage(
     params=MatchingNetParams,
     scope="split",
     monitored=True,
+    learnt=True,
 )
 
 DESCRIPTOR_NET = Stage(
@@ -170,6 +171,7 @@ DESCRIPTOR_NET = Stage(
     params=DescriptorNetParams,
     scope="split",
     monitored=True,
+    learnt=True,
 )
 
 COST_VOLUME = Stage(

@@ -89,6 +89,17 @@ def read_weights(product: str, data: bytes) -> dict[str, NDArray[np.float32]]:
     raise StageError(f"the weights of {product} have other tensors than its network, or of other shapes: {names}…")
 
 
+def read_metadata(data: bytes) -> dict[str, Any]:
+    """Return what a file of ``save_weights`` says of how it was made.
+
+    Args:
+        data: the file's bytes, which ``read_weights`` accepts.
+    """
+    length = int.from_bytes(data[:8], "little")  # of the JSON that a safetensors file begins with
+    written: dict[str, str] = json.loads(data[8 : 8 + length]).get("__metadata__", {})
+    return {name: json.loads(value) for name, value in written.items() if name != "product"}
+
+
 def _one_line(text: str, longest: int = 120) -> str:
     """Return text that a file may have chosen, fit for a message: printable, on one line, not endless."""
     return "".join(letter if letter.isprintable() else " " for letter in text[:longest])

@@ -32,7 +32,7 @@ def toy_plan(store: Store, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Pla
 
     def plan(graph: Graph, *forced: str) -> Plan:
         monkeypatch.setattr(planning, "build", lambda _: graph)
-        monkeypatch.setattr(planning, "ALL_PRODUCTS", ("ramp", "blurred", "clipped", "sum"))
+        monkeypatch.setattr(planning, "products", lambda: ("ramp", "blurred", "clipped", "sum"))
         request: Any = None
         return make_plan(request, store, forced)
 

@@ -13,6 +13,7 @@ from semidense.pipeline.pages.scene_maps import SceneMaps
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Plan, Planned
 from semidense.pipeline.plan.steps import NETS, SPLIT
+from semidense.stages.evaluation.filtering import SemidenseParams
 from semidense.stages.metrics import metric_rows
 
 MASK, THRESHOLD_PX = "nonocc", 1.0
@@ -125,4 +126,4 @@ def gather(task: Task) -> Gathered:
             f"nothing of {task.dataset} is cached in {store.root}: make it with `pipeline run {task.dataset}`"
         )
     config = next(iter(request.configs.values()))
-    return Gathered(task, plan, store, tuple(scenes), config.semidense.R)
+    return Gathered(task, plan, store, tuple(scenes), config.of("semidense", SemidenseParams).R)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from semidense.pipeline.pages.html import Html, table, tag, text
 from semidense.pipeline.pages.report.gathered import Gathered
-from semidense.pipeline.plan.steps import ALL_PRODUCTS, NETS
+from semidense.pipeline.plan.steps import NETS, products
 from semidense.pipeline.results.text import bytes_text
 from semidense.stages.catalog import STAGES
 
@@ -50,7 +50,7 @@ def done(found: Gathered) -> dict[str, Done]:
         entry = found.entries.get(planned.key or "") if planned.state == "hit" else None
         made = (entry.seconds, entry.size) if entry else (0.0, 0)
         counts[planned.step.product] = Done(cached + bool(entry), wanted + 1, seconds + made[0], size + made[1])
-    return {product: counts[product] for product in ALL_PRODUCTS if product in counts}
+    return {product: counts[product] for product in products() if product in counts}
 
 
 def done_beside(found: Gathered) -> dict[str, Done]:
@@ -63,7 +63,7 @@ def done_beside(found: Gathered) -> dict[str, Done]:
             counts[product] = Done(
                 before.cached + 1, before.wanted, before.seconds + entry.seconds, before.size + entry.size
             )
-    return {product: counts[product] for product in ALL_PRODUCTS if product in counts}
+    return {product: counts[product] for product in products() if product in counts}
 
 
 def steps_table(found: Gathered) -> Html:

@@ -1,11 +1,7 @@
 """How the networks learnt: their loss curves, and of shipped ones what is written in the file."""
 
-import json
 from collections.abc import Mapping
-from importlib.resources import as_file
 from typing import Any
-
-from safetensors import safe_open
 
 from semidense.pipeline.figures.figure import figure
 from semidense.pipeline.figures.training import loss_name
@@ -13,7 +9,8 @@ from semidense.pipeline.pages.html import Html, folded, table, tag, text
 from semidense.pipeline.pages.report.gathered import Gathered
 from semidense.pipeline.pages.report.pictures import svg
 from semidense.pipeline.plan.plan import Planned
-from semidense.pipeline.plan.shipped_weights import weights_file
+from semidense.pipeline.plan.shipped_weights import Weights
+from semidense.stages.weights import read_metadata
 
 
 def networks(found: Gathered) -> Html:
@@ -23,7 +20,8 @@ def networks(found: Gathered) -> Html:
 
 def _network(found: Gathered, product: str, planned: Planned) -> Html:
     dataset = found.store.open(planned.key or "")
-    about = _metadata(planned.step.argument) if "shipped" in planned.step.settings else None
+    weights = planned.step.argument
+    about = read_metadata(weights.read()) if isinstance(weights, Weights) else None
     if about is not None:
         dataset = dataset.assign_attrs(params=about.get("configuration", {}).get(product, {}))
     drawn = svg(
@@ -44,10 +42,3 @@ def _shipped(product: str, about: Mapping[str, Any]) -> Html:
         return told
     caption = f"Settings of the training of {product}"
     return told + folded(f"How {product} was trained", table(["setting", "value"], settings, caption=caption, words=2))
-
-
-def _metadata(name: str) -> dict[str, Any]:
-    """Return what a file of shipped weights says of how they were made."""
-    with as_file(weights_file(name)) as path, safe_open(path, framework="numpy") as file:
-        written: dict[str, str] = file.metadata() or {}
-    return {field: json.loads(value) for field, value in written.items() if field != "product"}

@@ -5,13 +5,13 @@ import json
 from semidense.cache import Entry, Store
 from semidense.pipeline.pages.html import Html, folded, table, tag, text
 from semidense.pipeline.pages.viewer.catalogue import Configuration
-from semidense.pipeline.plan.steps import ALL_PRODUCTS
+from semidense.pipeline.plan.steps import place
 from semidense.pipeline.results.text import bytes_text
 
 
 def provenance_table(chosen: Configuration, store: Store) -> Html:
     """Return each product of a configuration, with everything that its record tells folded below it."""
-    products = sorted(chosen.entries.items(), key=lambda item: ALL_PRODUCTS.index(item[0]))
+    entries = sorted(chosen.entries.items(), key=lambda item: place(item[0]))
     rows = [
         [
             product,
@@ -20,11 +20,11 @@ def provenance_table(chosen: Configuration, store: Store) -> Html:
             entry.created[:19].replace("T", " "),
             entry.key[:12],
         ]
-        for product, entry in products
+        for product, entry in entries
     ]
     head = ["product", "size", "made in", "made (UTC)", "key"]
     listed = table(head, rows, caption="The products of this configuration")
-    records = "".join(folded(product, _record(entry, store)) for product, entry in products)
+    records = "".join(folded(product, _record(entry, store)) for product, entry in entries)
     return listed + records + (_further(chosen) if chosen.further else "")
 
 

@@ -37,6 +37,8 @@ CALIBRATION = Stage(
     compute="semidense.stages.evaluation.calibration.stage:compute_calibration",
     params=CalibrationParams,
     scope="split",
+    learnt=True,
+    cross_fitted=True,
 )
 """How often a pixel of a confidence is right, in training scenes whose raw map and confidence come from networks that
 have not seen them (cross-fitting). ``disparity`` and ``confidence`` are one a scene, made by the networks of its

@@ -2,14 +2,16 @@ import numpy as np
 import pytest
 
 from semidense.pipeline.cli.terminal import small_disparity, small_picture
-from semidense.pipeline.plan.steps import PRODUCTS as ALL_PRODUCTS
+from semidense.stages.catalog import CATALOG, READ
 from tests.pipeline.products import PRODUCTS
 
 MAPS = {"images", "truth", "disparity", "semidense", "right_disparity", "refined", "filled"}
 MAPS |= {"confidence", "calibrated_confidence"}
 
+DATAFLOW = (*READ, *(stage.product for stage in CATALOG))
 
-@pytest.mark.parametrize("product", ALL_PRODUCTS)
+
+@pytest.mark.parametrize("product", DATAFLOW)
 def test_maps_have_a_picture_and_nothing_else(product: str) -> None:
     picture = small_picture(product, PRODUCTS[product]())
     assert (picture is not None) == (product in MAPS)

@@ -84,7 +84,7 @@ class Run:
     def nets(self) -> tuple[Made, Made]:
         """Add shipped weights."""
         arrays = {"parameters": np.zeros(3, np.float32), "loss": np.ones(1, np.float32)}
-        return tuple(self.add(name, SPLIT, arrays, stage=shipped.WEIGHTS[name]) for name in NETS)
+        return tuple(self.add(name, SPLIT, arrays, stage=shipped.weights_stage(name)) for name in NETS)
 
     def result(self) -> Result:
         return Result(Plan((), tuple(self.targets)), self.made, self.store, self.rows)

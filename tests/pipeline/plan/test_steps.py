@@ -9,8 +9,9 @@ from semidense.datasets import Dataset, SceneSource, open_dataset
 from semidense.pipeline.plan import shipped_weights as shipped
 from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.errors import UsageError
-from semidense.pipeline.plan.steps import PRODUCTS, SPLIT, Graph, Request, Step, build
+from semidense.pipeline.plan.steps import SPLIT, Graph, Request, Step, build, products
 from semidense.pipeline.plan.training_split import training_scenes
+from semidense.stages.catalog import CATALOG, READ
 from semidense.stages.stage import StageError
 from tests.tiny import PATH
 
@@ -60,7 +61,7 @@ def test_with_training_the_training_scenes_are_only_learnt_from() -> None:
 
 def test_training_scenes_are_known_by_their_content_not_their_name() -> None:
     renamed = tuple(replace(scene, name=f"other/{scene.name}", split="test") for scene in DATASET.scenes)
-    request = Request(Dataset("renamed", renamed), {"": Config()}, "metrics", True, training_scenes(DATASET))
+    request = Request(Dataset("renamed", renamed), {"": Config.load()}, "metrics", True, training_scenes(DATASET))
     made = build(request)
     assert [made.steps[each].scene for each, _ in made.targets] == ["other/test-0", "other/test-1"]
     assert [note.split(" ")[0] for note in made.notes] == ["other/train-0", "other/train-1"]
@@ -69,7 +70,7 @@ def test_training_scenes_are_known_by_their_content_not_their_name() -> None:
 def test_where_all_scenes_are_trained_on_nothing_is_left() -> None:
     only = Dataset("synthetic", training_scenes(DATASET))
     with pytest.raises(UsageError, match="no scene is left to work on; train-0 is a training scene") as caught:
-        build(Request(only, {"": Config()}, "metrics", True, only.scenes))
+        build(Request(only, {"": Config.load()}, "metrics", True, only.scenes))
     assert "\n" not in str(caught.value)
 
 
@@ -91,7 +92,7 @@ def test_a_training_can_rest_on_networks_that_come_with_the_package() -> None:
 @pytest.mark.parametrize(("mode", "ending"), [("exact", ""), ("guided", ".guided"), ("fast", "")])
 def test_raw_maps_of_a_mode_are_scored_by_what_was_learnt_from_such(mode: str, ending: str) -> None:
     made = graph(f"costvolume.mode={mode}", "semidense.max_error=0.1", upto="semidense")
-    used = {step.argument for step in made.steps.values() if "shipped" in step.settings}
+    used = {step.argument.name for step in made.steps.values() if "shipped" in step.settings}
     nets = {"matching_net", "descriptor_net"} - {{"exact": "descriptor_net", "fast": "matching_net"}.get(mode)}
     assert used == nets | {f"evaluation_net{ending}", f"calibration{ending}"}
 
@@ -102,7 +103,7 @@ def test_a_run_stops_at_the_product_asked_for() -> None:
 
 
 @pytest.mark.parametrize("train", [False, True])
-@pytest.mark.parametrize("upto", PRODUCTS)
+@pytest.mark.parametrize("upto", (*READ, *(stage.product for stage in CATALOG)))
 def test_every_step_comes_after_its_inputs(upto: str, train: bool) -> None:
     if upto in ("matching_samples", "evaluation_samples") and not train:
         pytest.skip("samples are drawn for training only")
@@ -113,7 +114,7 @@ def test_every_step_comes_after_its_inputs(upto: str, train: bool) -> None:
 
 
 def test_products_are_in_order() -> None:
-    places = [PRODUCTS.index(step.product) for step in graph(train=True).steps.values()]
+    places = [products().index(step.product) for step in graph(train=True).steps.values()]
     assert places == sorted(places)
 
 
@@ -150,7 +151,7 @@ def test_a_scene_without_truth_gets_maps_and_no_metrics() -> None:
     made = graph(dataset=without_truth())
     last = {made.steps[each].scene: made.steps[each].product for each, _ in made.targets}
     assert last == {"train-0": "metrics", "train-1": "metrics", "test-0": "metrics", "test-1": "semidense"}
-    assert made.notes == ["test-1 has no ground truth: there are no metrics for it"]
+    assert made.notes == ["test-1 has no ground truth: no metrics can be made for it"]
     assert not [step for step in made.steps.values() if step.product == "truth" and step.scene == "test-1"]
 
 
@@ -256,7 +257,8 @@ def test_what_networks_say_does_not_depend_on_the_code_that_trains_them(product:
 def test_the_order_of_training_scenes_is_part_of_the_key() -> None:
     forward, backward = training_scenes(DATASET), training_scenes(DATASET)[::-1]
     ids = [
-        build(Request(DATASET, {"": Config()}, "matching_net", True, scenes)).targets for scenes in (forward, backward)
+        build(Request(DATASET, {"": Config.load()}, "matching_net", True, scenes)).targets
+        for scenes in (forward, backward)
     ]
     assert ids[0] != ids[1]
 
@@ -269,7 +271,9 @@ def test_a_label_names_product_dataset_and_scene() -> None:
 
 def test_no_path_is_in_a_key(make_pair: Callable[[Path], Path], tmp_path: Path) -> None:
     made = [
-        build(Request(open_dataset(f"middlebury:{make_pair(tmp_path / place / 'pair')}"), {"": Config()}, "channels"))
+        build(
+            Request(open_dataset(f"middlebury:{make_pair(tmp_path / place / 'pair')}"), {"": Config.load()}, "channels")
+        )
         for place in ("here", "there")
     ]
     assert list(made[0].steps) == list(made[1].steps)
