@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from semidense.datasets.formats.pfm import read_pfm, write_pfm
     from semidense.datasets.formats.png16 import read_png16, write_png16
     from semidense.datasets.occlusion import left_right_check, warped_truth_mask
-    from semidense.datasets.registry import Dataset, describe, open_dataset
+    from semidense.datasets.registry import Dataset, Kind, describe, open_dataset, register_dataset
     from semidense.datasets.scene import (
         IMAGE_ROLES,
         TRUTH_ROLES,
@@ -51,6 +51,7 @@ __all__ = [
     "DatasetError",
     "DisparityRange",
     "ImageError",
+    "Kind",
     "LayoutError",
     "MissingFileError",
     "PfmError",
@@ -69,6 +70,7 @@ __all__ = [
     "read_image",
     "read_pfm",
     "read_png16",
+    "register_dataset",
     "warped_truth_mask",
     "write_pfm",
     "write_png16",

@@ -1,10 +1,13 @@
 """Find the scenes that a specification such as ``middlebury:DIR`` names."""
 
 import difflib
+import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
 from typing import Protocol, cast
 
 from semidense.datasets.errors import DatasetError, SceneNotFound, UnknownDatasetError
@@ -69,60 +72,107 @@ class _Lister(Protocol):
 
 
 @dataclass(frozen=True)
-class _Benchmark:
+class Kind:
+    """A kind of dataset that a specification can name.
+
+    Attributes:
+        pattern: how its specifications are written, such as ``eth3d:DIR``; the name stands before the colon.
+        description: one line for people.
+        module: dotted name of the module whose ``list_scenes(argument)`` gives the `SceneSource` of each scene. It is
+            imported when it is asked for: listing the names must stay cheap.
+    """
+
     pattern: str
     description: str
     module: str
 
+    @property
+    def name(self) -> str:
+        """What stands before the colon."""
+        return re.split(r"[:\[]", self.pattern)[0]
 
-_BENCHMARKS = {
-    "motorcycle": _Benchmark(
-        "motorcycle", "the Middlebury 2014 Motorcycle pair that scikit-image ships", "benchmarks.motorcycle"
-    ),
-    "middlebury": _Benchmark(
+
+_HERE = __name__.rpartition(".")[0]
+_KINDS = (
+    Kind("motorcycle", "the Middlebury 2014 Motorcycle pair that scikit-image ships", f"{_HERE}.benchmarks.motorcycle"),
+    Kind(
         "middlebury:DIR",
         "Middlebury MiddEval3, 2014, 2001, 2003, 2005 or 2006: a scene, a collection or a root of several",
-        "benchmarks.middlebury",
+        f"{_HERE}.benchmarks.middlebury",
     ),
-    "kitti2015": _Benchmark("kitti2015:DIR", "KITTI Stereo 2015: its root or its training folder", "benchmarks.kitti"),
-    "eth3d": _Benchmark("eth3d:DIR", "ETH3D two-view: a scene, two_view_training or its parent", "benchmarks.eth3d"),
-    "synthetic": _Benchmark(
+    Kind("kitti2015:DIR", "KITTI Stereo 2015: its root or its training folder", f"{_HERE}.benchmarks.kitti"),
+    Kind("eth3d:DIR", "ETH3D two-view: a scene, two_view_training or its parent", f"{_HERE}.benchmarks.eth3d"),
+    Kind(
         "synthetic[:KEY=VALUE,...]",
         "rendered planes with exact truth; see semidense.datasets.synthetic.scenes for the keys",
-        "synthetic.scenes",
+        f"{_HERE}.synthetic.scenes",
     ),
-    "pair": _Benchmark(
+    Kind(
         "pair:LEFT,RIGHT[,KEY=VALUE,...]",
         "your own: two files, folders or patterns, or pair:LIST.csv; see `match`",
-        "pairs.pair",
+        f"{_HERE}.pairs.pair",
     ),
-}
+)
+GROUP = "semidense.datasets"
+"""Entry points of this group name the `Kind` of a dataset that another package reads."""
+_registered: dict[str, Kind] = {}
+
+
+def register_dataset(kind: Kind) -> None:
+    """Add a kind of dataset from outside this package.
+
+    Raises:
+        DatasetError: If its name is taken by another kind.
+    """
+    if kinds().get(kind.name, kind) != kind:
+        raise DatasetError(f"data set {kind.name!r} ({kind.module}): the name is taken; choose another")
+    _registered[kind.name] = kind
+
+
+def kinds() -> dict[str, Kind]:
+    """Return every kind of dataset by its name: our own, those of installed packages, those that were registered.
+
+    Raises:
+        DatasetError: If an installed package's entry point cannot be loaded.
+    """
+    return {kind.name: kind for kind in (*_registered.values(), *_installed(), *_KINDS)}
+
+
+@cache
+def _installed() -> tuple[Kind, ...]:
+    return tuple(_load(point) for point in entry_points(group=GROUP))
+
+
+def _load(point: EntryPoint) -> Kind:
+    try:
+        return cast(Kind, point.load())
+    except Exception as error:
+        raise DatasetError(f"the plug-in {point.name} = {point.value} cannot be loaded: {error}") from error
 
 
 def open_dataset(spec: str) -> Dataset:
     """List the scenes that a specification names; no pixel is decoded unless a range must be read from the truth.
 
     Args:
-        spec: ``motorcycle``, ``middlebury:DIR``, ``kitti2015:DIR``, ``eth3d:DIR``,
-            ``synthetic[:KEY=VALUE,...]`` or ``pair:LEFT,RIGHT[,KEY=VALUE,...]``.
+        spec: such as ``motorcycle``, ``middlebury:DIR`` or ``pair:LEFT,RIGHT[,KEY=VALUE,...]``; `describe` lists all.
 
     Raises:
         UnknownDatasetError: If the name before the colon is not known; the nearest one is given.
         DatasetError: If the folder does not follow the layout, or a file in it is not valid.
     """
     name, _, argument = spec.partition(":")
-    if name not in _BENCHMARKS:
-        near = difflib.get_close_matches(name.lower(), _BENCHMARKS, n=1, cutoff=0.4)
-        hint = f"did you mean {_BENCHMARKS[near[0]].pattern}?" if near else f"known are {', '.join(_patterns())}"
+    known = kinds()
+    if name not in known:
+        near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.4)
+        hint = f"did you mean {known[near[0]].pattern}?" if near else f"known are {', '.join(_patterns())}"
         raise UnknownDatasetError(f"no data set {name!r}; {hint}")
-    # A benchmark's module is imported when it is asked for: listing the names must stay cheap.
-    lister = cast(_Lister, import_module(f"semidense.datasets.{_BENCHMARKS[name].module}"))
+    lister = cast(_Lister, import_module(known[name].module))
     return Dataset(spec, lister.list_scenes(argument))
 
 
 def describe() -> list[tuple[str, str]]:
     """Give each specification's pattern and what it stands for."""
-    return [(benchmark.pattern, benchmark.description) for benchmark in _BENCHMARKS.values()]
+    return [(kind.pattern, kind.description) for kind in kinds().values()]
 
 
 def _patterns() -> list[str]:

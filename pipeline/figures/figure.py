@@ -14,11 +14,17 @@ from semidense.pipeline.figures.colours import confidence_rgb, disparity_rgb, di
 from semidense.pipeline.figures.cost_volume import draw_costs
 from semidense.pipeline.figures.curves import error_curve_figure
 from semidense.pipeline.figures.drawing import new_figure
-from semidense.pipeline.figures.maps import draw_channels, draw_confidence, draw_disparity, draw_images, draw_truth
+from semidense.pipeline.figures.maps import (
+    draw_any,
+    draw_channels,
+    draw_confidence,
+    draw_disparity,
+    draw_images,
+    draw_truth,
+)
 from semidense.pipeline.figures.metrics_table import draw_metrics
 from semidense.pipeline.figures.survey import draw_survey
 from semidense.pipeline.figures.training import draw_evaluation_samples, draw_matching_samples, draw_network
-from semidense.pipeline.plan.config import nearest
 from semidense.pipeline.plan.errors import UsageError
 
 __all__ = [
@@ -91,16 +97,15 @@ def figure(
         disparity: of a cost volume, the disparity of the slice, px; None for the usual one in the middle rows.
 
     Raises:
-        UsageError: if there is no such product, a pixel or disparity is given for another product than a cost
-            volume, or one lies outside of it.
+        UsageError: if a product of another package has no map, a pixel or disparity is given for another product than
+            a cost volume, or one lies outside of it.
     """
-    if product not in _DRAW:
-        raise UsageError(f"no figure of a product {product!r}; {nearest(product, _DRAW)}")
+    draw = _DRAW.get(product, draw_any)
     chosen = {name: value for name, value in (("pixel", pixel), ("disparity", disparity)) if value is not None}
     if chosen and product != "costvolume":
         raise UsageError(f"{product}: a {next(iter(chosen))} is chosen in a costvolume, not in this product")
     drawn = new_figure(title)
-    _DRAW[product](drawn, dataset, **chosen)
+    draw(drawn, dataset, **chosen)
     return drawn
 
 

@@ -20,6 +20,7 @@ from semidense.pipeline.figures.drawing import (
     none_patch,
     share_patch,
 )
+from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.images_and_truth import MASK_KINDS
 from semidense.stages.transforms.declaration import ORDER
 
@@ -97,3 +98,21 @@ def draw_confidence(figure: Figure, dataset: xr.Dataset) -> None:
     draw_map(axes, confidence, scale)
     axes.set_title("probability that the disparity is right")
     legend_below(figure, (none_patch(confidence),))
+
+
+def draw_any(figure: Figure, dataset: xr.Dataset) -> None:
+    """Draw the maps of a product whose stage is of another package, each on its own scale.
+
+    Raises:
+        UsageError: if no array has the image's rows and columns.
+    """
+    maps = [array for array in dataset.data_vars.values() if array.dims == ("y", "x")]
+    if not maps:
+        raise UsageError("this product has no map (y, x) to draw")
+    height, width = maps[0].shape
+    axes = image_panels(figure, (height, width), columns=len(maps))[0]
+    for each, array in zip(axes, maps, strict=True):
+        values = array.values.astype(np.float32)
+        draw_map(each, values, disparity_scale(values, f"{array.name} ({array.attrs.get('units', '1')})"))
+        each.set_title(str(array.attrs.get("long_name", array.name)))
+    legend_below(figure, [none_patch(array.values.astype(np.float32)) for array in maps[:1]])
