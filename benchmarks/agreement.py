@@ -16,7 +16,8 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.harness import write
-from semidense.pipeline.api import Result, Task, run
+from semidense.pipeline.api import Task, run
+from semidense.pipeline.results.result import Result
 from semidense.stages.evaluation.agreement import agreement
 from semidense.stages.evaluation.declaration import ConfidenceParams
 from semidense.stages.metrics import auc, optimal_auc

@@ -23,7 +23,8 @@ from rich.console import Console
 from rich.table import Table
 
 from semidense.cache.entries import check
-from semidense.pipeline.api import Result, Task, run
+from semidense.pipeline.api import Task, run
+from semidense.pipeline.results.result import Result
 
 TARGET = 3.0
 """Percent of the stage's time."""

@@ -19,12 +19,13 @@ from rich.table import Table
 
 from benchmarks.harness import write
 from semidense.datasets import SceneSource, open_dataset
-from semidense.pipeline.api import Result, Task, carry_out
+from semidense.pipeline.api import Task, carry_out
 from semidense.pipeline.execution.progress import ProgressWatch
 from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.plan.training_split import families, training_scenes
+from semidense.pipeline.results.result import Result
 from semidense.stages.compute.precision import resolve
 from semidense.stages.disparity.winner_takes_all import winner_take_all
 from semidense.stages.matching.cost_volume import compute_costs

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Protocol, cast
 
 from semidense.datasets.errors import DatasetError, SceneNotFound, UnknownDatasetError
@@ -155,6 +156,7 @@ def open_dataset(spec: str) -> Dataset:
 
     Args:
         spec: such as ``motorcycle``, ``middlebury:DIR`` or ``pair:LEFT,RIGHT[,KEY=VALUE,...]``; `describe` lists all.
+            A folder alone is taken for the benchmark whose layout it has.
 
     Raises:
         UnknownDatasetError: If the name before the colon is not known; the nearest one is given.
@@ -162,12 +164,27 @@ def open_dataset(spec: str) -> Dataset:
     """
     name, _, argument = spec.partition(":")
     known = kinds()
+    if name not in known and spec and Path(spec).is_dir():
+        return open_dataset(folder_spec(Path(spec)))
     if name not in known:
         near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.4)
         hint = f"did you mean {known[near[0]].pattern}?" if near else f"known are {', '.join(_patterns())}"
         raise UnknownDatasetError(f"no data set {name!r}; {hint}")
     lister = cast(_Lister, import_module(known[name].module))
     return Dataset(spec, lister.list_scenes(argument))
+
+
+def folder_spec(folder: Path) -> str:
+    """Return the specification of a folder in a benchmark's layout: KITTI's and ETH3D's by their folders' names.
+
+    >>> folder_spec(Path("data/eth3d/two_view_training"))
+    'eth3d:data/eth3d/two_view_training'
+    """
+    inside = {path.name for path in folder.glob("*")} | {path.name for path in folder.glob("training/*")}
+    around = set(folder.absolute().parts)
+    if "image_2" in inside:
+        return f"kitti2015:{folder}"
+    return f"eth3d:{folder}" if "two_view_training" in inside | around else f"middlebury:{folder}"
 
 
 def describe() -> list[tuple[str, str]]:

@@ -3,13 +3,48 @@
 The verbs of the command line as functions; products come back as lazy xarray objects:
 
     from semidense import pipeline
-    run = pipeline.run("motorcycle")
-    costs = run.open("costvolume", "Motorcycle")     # dims y, x, d; attrs tell where it comes from
+    run = pipeline.run("motorcycle", settings={"costvolume.mode": "fast"})
+    costs = run.open("costvolume")                   # dims y, x, d; attrs tell where it comes from
     found = pipeline.match("left.png", "right.png")  # your own pair: found.disparity, found.confidence
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from semidense.datasets.registry import register_dataset
+    from semidense.pipeline.api import Task, explain, open_store, run, status, sweep
+    from semidense.pipeline.comparison.experiments import compare
+    from semidense.pipeline.files.run_files import export
+    from semidense.pipeline.pages.report import report
+    from semidense.pipeline.pages.viewer import view
+    from semidense.pipeline.pairs.match import Match, match
+    from semidense.pipeline.pairs.opencv import StereoMatcher
+    from semidense.pipeline.plan.config import Config
+    from semidense.pipeline.results.opening import open_product
+    from semidense.pipeline.results.result import Result
+    from semidense.stages.catalog import register
+
+_HOMES = {
+    "Config": "plan.config",
+    "Match": "pairs.match",
+    "Result": "results.result",
+    "StereoMatcher": "pairs.opencv",
+    "Task": "api",
+    "compare": "comparison.experiments",
+    "explain": "api",
+    "export": "files.run_files",
+    "match": "pairs.match",
+    "open_product": "results.opening",
+    "open_store": "api",
+    "register": "..stages.catalog",
+    "register_dataset": "..datasets.registry",
+    "report": "pages.report",
+    "run": "api",
+    "status": "api",
+    "sweep": "api",
+    "view": "pages.viewer",
+}
 
 __all__ = [
     "Config",
@@ -21,6 +56,10 @@ __all__ = [
     "explain",
     "export",
     "match",
+    "open_product",
+    "open_store",
+    "register",
+    "register_dataset",
     "report",
     "run",
     "status",
@@ -28,20 +67,17 @@ __all__ = [
     "view",
 ]
 
-_HOMES = {
-    "Config": "semidense.pipeline.plan.config",
-    "Match": "semidense.pipeline.pairs.match",
-    "StereoMatcher": "semidense.pipeline.pairs.opencv",
-    "compare": "semidense.pipeline.comparison.experiments",
-    "export": "semidense.pipeline.files.run_files",
-    "match": "semidense.pipeline.pairs.match",
-    "report": "semidense.pipeline.pages.report",
-    "view": "semidense.pipeline.pages.viewer",
-}
+
+if not TYPE_CHECKING:
+    # Hidden from type checkers, which would take it to mean that any name is there.
+    def __getattr__(name: str) -> object:
+        """Import a verb when it is first used: ``from semidense import pipeline`` stays light."""
+        if name in _HOMES:
+            home = _HOMES[name]
+            module = import_module(home if home.startswith(".") else f".{home}", __name__)
+            return getattr(module, name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-def __getattr__(name: str) -> Any:  # noqa: ANN401
-    """Import a verb when it is first used: ``from semidense import pipeline`` stays light."""
-    if name in __all__:
-        return getattr(import_module(_HOMES.get(name, "semidense.pipeline.api")), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -5,27 +5,22 @@ import itertools
 import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any, TypedDict, Unpack
 
 from semidense.cache import Store
 from semidense.datasets import Dataset, SceneSource, open_dataset
 from semidense.pipeline.execution.retry import attempt
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.execution.watch import Unwatched, Watch
-from semidense.pipeline.plan.config import Config, parse_setting
+from semidense.pipeline.plan.config import Config, Settings, alternatives, setting_texts, value_text
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made, Plan, Planned, make_plan
 from semidense.pipeline.plan.ranges import close_ranges
 from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.plan.training_split import training_scenes
-from semidense.pipeline.results.opening import open_product
-
-if TYPE_CHECKING:
-    import xarray as xr
+from semidense.pipeline.results.result import Result
 
 CACHE_VARIABLE = "PIPELINE_CACHE"
 METHOD = "dual-cnn"
@@ -40,25 +35,75 @@ def open_store(folder: Path | str | None = None) -> Store:
     return Store(Path(chosen).expanduser())
 
 
+Data = str | Path | Dataset
+"""What a dataset is named by: a specification such as ``middlebury:DIR``, a folder, or an opened one."""
+
+
+class Options(TypedDict, total=False):
+    """What all verbs share, by name; ``Task`` says what each is."""
+
+    scenes: Sequence[str]
+    settings: Settings
+    config: Path | str | None
+    train: bool
+    cache: Path | str | None
+
+
 @dataclass(frozen=True)
 class Task:
     """What a user asks for: the arguments that all verbs share.
 
     Attributes:
-        dataset: such as ``motorcycle`` or ``middlebury:DIR``, see ``datasets.describe``; or an opened one.
+        dataset: such as ``motorcycle`` or ``middlebury:DIR``, see ``datasets.describe``; a folder in a benchmark's
+            layout; or an opened one.
         scenes: names of scenes; none for all of the dataset.
-        settings: ``section.field=value``, over the file's and the defaults.
+        settings: such as ``{"costvolume.mode": "fast"}`` or ``["costvolume.mode=fast"]``, over the file's and the
+            defaults; kept as the latter.
         config: a TOML file.
         train: train the networks on the training scenes instead of taking the shipped weights.
         cache: the cache's folder.
     """
 
-    dataset: str | Dataset = "motorcycle"
+    dataset: Data = "motorcycle"
     scenes: Sequence[str] = ()
-    settings: Sequence[str] = ()
-    config: Path | None = None
+    settings: Settings = ()
+    config: Path | str | None = None
     train: bool = False
     cache: Path | str | None = None
+
+    def __post_init__(self) -> None:
+        """Bring what may be typed in several ways into one form."""
+        object.__setattr__(self, "settings", setting_texts(self.settings))
+        object.__setattr__(self, "scenes", (self.scenes,) if isinstance(self.scenes, str) else tuple(self.scenes))
+
+    @classmethod
+    def of(cls, dataset: "Data | Task", **options: Unpack[Options]) -> "Task":
+        """Return the task that a verb's arguments describe; options refine one that is given."""
+        return replace(dataset, **options) if isinstance(dataset, Task) else cls(dataset, **options)
+
+    def and_settings(self, further: Settings) -> "Task":
+        """Return the task with further settings, which win."""
+        return replace(self, settings=(*setting_texts(self.settings), *setting_texts(further)))
+
+    def configuration(self) -> Config:
+        """Return the configuration that the file and the settings describe.
+
+        Raises:
+            UsageError: if one of them is not valid.
+        """
+        return Config.load(Path(self.config) if self.config else None, setting_texts(self.settings))
+
+    def open(self) -> Dataset:
+        """Return the dataset, narrowed to the scenes that are named.
+
+        Raises:
+            DatasetError: if it cannot be read.
+        """
+        whole = self._whole()
+        return whole.select(self.scenes) if self.scenes else whole
+
+    def _whole(self) -> Dataset:
+        return self.dataset if isinstance(self.dataset, Dataset) else open_dataset(str(self.dataset))
 
     def request(self, upto: str, variants: Iterable[Sequence[str]] = ((),)) -> Request:
         """Return the request for products up to ``upto``, in one variant for each list of further settings.
@@ -66,86 +111,53 @@ class Task:
         Raises:
             UsageError, DatasetError: if it cannot be carried out as it stands.
         """
-        configs = {", ".join(further): Config.load(self.config, [*self.settings, *further]) for further in variants}
-        whole = open_dataset(self.dataset) if isinstance(self.dataset, str) else self.dataset
-        dataset = whole.select(self.scenes) if self.scenes else whole
+        configs = {", ".join(further): self.and_settings(further).configuration() for further in variants}
         training: tuple[SceneSource, ...] = ()
         if self.train:
             other = next(iter(configs.values())).training.dataset
-            training = training_scenes(open_dataset(other) if other else whole)
-        return Request(dataset, configs, upto, self.train, training)
+            training = training_scenes(open_dataset(other) if other else self._whole())
+        return Request(self.open(), configs, upto, self.train, training)
 
 
-@dataclass(frozen=True)
-class Result:
-    """What a run made or found.
-
-    Attributes:
-        plan: as it was before the run.
-        made: the result of each step, by its id.
-        store: the cache.
-        metrics: rows as promised to scripts; empty if the run stopped before ``metrics``.
-    """
-
-    plan: Plan
-    made: Mapping[str, Made]
-    store: Store
-    metrics: list[dict[str, Any]] = field(default_factory=list)
-
-    def find(self, product: str, scene: str | None = None) -> Made:
-        """Return the result of a product; of a scene, if there are several.
-
-        Raises:
-            UsageError: if there is none, or several fit.
-        """
-        found = [
-            made
-            for made in self.made.values()
-            if made.step.product == product and scene in (None, made.step.scene, made.step.scene.rsplit("/", 1)[-1])
-        ]
-        if len(found) != 1:
-            names = ", ".join(sorted({made.step.scene for made in found})) or "none"
-            raise UsageError(
-                f"{product} of {scene or 'the only scene'}: {len(found)} results fit ({names}); name a scene"
-            )
-        return found[0]
-
-    def open(self, product: str, scene: str | None = None) -> "xr.Dataset":
-        """Return a product as a lazy dataset with coordinates, units and provenance; see ``open_product``."""
-        return open_product(self.store, self.find(product, scene).key)
-
-
-def status(task: Task | str = "motorcycle", upto: str = "metrics", forced: Sequence[str] = ()) -> Plan:
+def status(
+    dataset: Data | Task = "motorcycle",
+    upto: str = "metrics",
+    *,
+    forced: Sequence[str] = (),
+    **options: Unpack[Options],
+) -> Plan:
     """Return the plan of a run: every step with its state. Nothing is made or changed."""
-    task = Task(task) if isinstance(task, str) else task
+    task = Task.of(dataset, **options)
     store = open_store(task.cache)
     return make_plan(close_ranges(task.request(upto), store), store, forced)
 
 
 def run(
-    task: Task | str = "motorcycle",
+    dataset: Data | Task = "motorcycle",
     upto: str = "metrics",
     *,
     forced: Sequence[str] = (),
     watch: Watch | None = None,
     scheduler: str | None = None,
     workers: int | None = None,
+    **options: Unpack[Options],
 ) -> Result:
     """Make the products of a dataset up to ``upto``, reusing all that is cached.
 
     Args:
-        task: what to work on; a text is a dataset.
+        dataset: what to work on: a dataset, or a task that ``options`` refine.
         upto: the product to stop at.
         forced: products to make again; the new result must equal the old.
         watch: told how it goes on.
         scheduler: address of a Dask scheduler, ``tcp://...``; None for threads of this process.
         workers: threads; None for one a core.
+        **options: ``scenes``, ``settings``, ``config``, ``train`` and ``cache``, as ``Task`` has them.
 
     Raises:
         UsageError, DatasetError, CacheError, StageError: what the user can mend, in one line.
         StageFailed: a fault of a stage, with its cause.
     """
-    task = Task(task) if isinstance(task, str) else task
+    task = Task.of(dataset, **options)
     return carry_out(task, task.request(upto), forced, watch, scheduler, workers)
 
 
@@ -181,57 +193,47 @@ def _metric_rows(plan: Plan, store: Store, made: Mapping[str, Made]) -> Iterator
             yield from (row | named for row in metric_rows(each.step.scene, METHOD, each.step.R, arrays))
 
 
-def mask_kinds(result: Result) -> dict[str, str]:
-    """Return where the non-occlusion mask of each scene of a run comes from."""
-    from semidense.pipeline.plan.images_and_truth import MASK_KINDS
-
-    truths = [made for made in result.made.values() if made.step.product == "truth"]
-    return {
-        made.step.scene: MASK_KINDS[int(np.asarray(result.store.arrays(made.key)["mask_kind"][...])[0])]
-        for made in truths
-    }
-
-
 def sweep(
-    task: Task | str = "motorcycle",
-    R: str | Sequence[float] = "0.05:0.95:0.05",
-    settings: Sequence[str] = (),
+    dataset: Data | Task = "motorcycle",
+    R: str | float | Sequence[float] = "0.05:0.95:0.05",
+    over: Mapping[str, Sequence[object]] | Sequence[str] = (),
     *,
     watch: Watch | None = None,
     scheduler: str | None = None,
     workers: int | None = None,
+    **options: Unpack[Options],
 ) -> Result:
     """Make the metrics for every value of R, and for every combination of several values of settings.
 
     Args:
-        task: what to work on; a text is a dataset.
+        dataset: what to work on: a dataset, or a task that ``options`` refine.
         R: confidence thresholds, or ``first:last:step`` with the last one included.
-        settings: ``section.field=value1,value2``; all combinations are made.
+        over: ``{"section.field": [value1, value2]}`` or ``section.field=value1,value2``; all combinations are made.
         watch: as for ``run``.
         scheduler: as for ``run``.
         workers: as for ``run``.
+        **options: as for ``run``.
 
     Returns:
         One result with the metrics of all variants; ``variant`` in each row names the combination.
     """
-    task = Task(task) if isinstance(task, str) else task
-    thresholds = [f"semidense.R={value:g}" for value in parse_thresholds(R)]
+    task = Task.of(dataset, **options)
+    thresholds = [f"semidense.R={value!r}" for value in parse_thresholds(R)]
     variants = [
-        (threshold, *combination)
-        for combination in itertools.product(*(_alternatives(setting) for setting in settings))
-        for threshold in thresholds
+        (threshold, *combination) for combination in itertools.product(*_combined(over)) for threshold in thresholds
     ]
     return carry_out(task, task.request("metrics", variants), (), watch, scheduler, workers)
 
 
-def _alternatives(setting: str) -> list[str]:
-    """Return ``section.field=v1,v2`` as one setting a value."""
-    section, name, values = parse_setting(setting)
-    return [f"{section}.{name}={value}" for value in values.split(",")]
+def _combined(over: Mapping[str, Sequence[object]] | Sequence[str]) -> list[list[str]]:
+    """Return each swept setting as one text a value."""
+    if isinstance(over, Mapping):
+        return [[f"{name}={value_text(name, value)}" for value in values] for name, values in over.items()]
+    return [alternatives(setting) for setting in over]
 
 
-def parse_thresholds(R: str | Sequence[float]) -> list[float]:
-    """Return the thresholds that ``first:last:step``, ``value,value`` or a sequence names.
+def parse_thresholds(R: str | float | Sequence[float]) -> list[float]:
+    """Return the thresholds that ``first:last:step``, ``value,value``, a number or a sequence names.
 
     Raises:
         UsageError: if it is none of these, or a threshold lies outside [0, 1].
@@ -240,6 +242,7 @@ def parse_thresholds(R: str | Sequence[float]) -> list[float]:
     [0.1, 0.2, 0.3]
     """
     try:
+        R = [R] if isinstance(R, int | float) else R
         values = _span(R) if isinstance(R, str) and ":" in R else _list(R)
     except ValueError:
         raise UsageError(f"R = {R!r}: write a number, numbers with commas, or first:last:step") from None
@@ -262,12 +265,13 @@ def _list(R: str | Sequence[float]) -> list[float]:
     return [float(part) for part in (R.split(",") if isinstance(R, str) else R)]
 
 
-def explain(task: Task, product: str, scene: str | None = None) -> Planned:
+def explain(dataset: Data | Task, product: str, scene: str | None = None, **options: Unpack[Options]) -> Planned:
     """Return a product's step with its state; ``step.recipe`` and ``changed`` say what its key is made of.
 
     Raises:
         UsageError: if there is no such product, or several scenes fit.
     """
+    task = Task.of(dataset, **options)
     plan = status(task, product)
     targets = dict(plan.targets)
     asked = [planned for planned in plan.steps if planned.step.id in targets and planned.step.product == product]

@@ -13,7 +13,8 @@ import pytest
 from tests.tiny import NETS, SETTINGS, SPEC
 
 if TYPE_CHECKING:  # the package is imported when it is used: most tests do without torch
-    from semidense.pipeline.api import Result, Task
+    from semidense.pipeline.api import Task
+    from semidense.pipeline.results.result import Result
 
 PROJECT = Path(__file__).parents[1]
 

@@ -95,7 +95,7 @@ def compare(
     if as_json:
         console.print_json(comparison_report.as_json(found, files))
         return
-    tables.print_comparison(found, api.mask_kinds(found.result).values(), threshold)
+    tables.print_comparison(found, found.result.mask_kinds().values(), threshold)
     console.print_notes(found.notes)
     for file in files:
         typer.echo(f"wrote {file}")

@@ -125,7 +125,7 @@ def print_inspection(found: Inspection, png: Path | None, as_json: bool) -> None
     if png:
         console.print(f"wrote {png}", markup=False)
     console.print(
-        "in Python: from semidense.pipeline.api import open_product, open_store; "
+        "in Python: from semidense.pipeline import open_product, open_store; "
         f'open_product(open_store("{found.store.root}"), "{found.planned.key}")',
         markup=False,
     )

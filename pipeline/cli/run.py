@@ -23,8 +23,9 @@ from semidense.pipeline.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from semidense.pipeline.api import Result, Task
+    from semidense.pipeline.api import Task
     from semidense.pipeline.plan.plan import Plan
+    from semidense.pipeline.results.result import Result
 
 
 def register(app: typer.Typer) -> None:
@@ -55,7 +56,7 @@ def run(
 
     task = _task(dataset, scene, settings, config, train, cache)
     if dry_run:
-        return _print_plan(api.status(task, upto, force or ()), as_json)
+        return _print_plan(api.status(task, upto, forced=force or ()), as_json)
     with ProgressWatch() as watch:
         result = api.run(task, upto, forced=force or (), watch=watch, scheduler=scheduler, workers=workers)
     files = _export(result, output)
@@ -99,7 +100,7 @@ def sweep(
         steps = console.step_rows(result.plan, result.made)
         console.print_json({"steps": steps, "metrics": result.metrics, "files": [str(file) for file in files]})
     else:
-        console.print_sweep(result.metrics, api.mask_kinds(result))
+        console.print_sweep(result.metrics, result.mask_kinds())
         _say_files(files)
         print(console.reuse_line(result.made.values()))
 
@@ -200,10 +201,9 @@ def _print_plan(plan: "Plan", as_json: bool) -> None:
 
 
 def _print_result(result: "Result", files: list[Path]) -> None:
-    from semidense.pipeline import api
     from semidense.pipeline.cli import console
 
-    console.print_metrics(result.metrics, api.mask_kinds(result))
+    console.print_metrics(result.metrics, result.mask_kinds())
     console.print_notes(result.plan.notes)
     _say_files(files)
     print(console.reuse_line(result.made.values()))

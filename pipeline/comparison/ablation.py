@@ -1,12 +1,12 @@
 """What the transforms are worth: matching-Nets that see different channels, trained alike from nothing."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from semidense.datasets import Dataset, SceneSource
-from semidense.pipeline.api import Result, Task
+from semidense.pipeline.api import Task
 from semidense.pipeline.comparison.rows import Judged, Row, raw_rows
-from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.steps import Request
+from semidense.pipeline.results.result import Result
 
 ABLATION = {
     "gray + rank + companion, trained alike": ("gray", "rank", "companion"),
@@ -20,8 +20,7 @@ ABLATION = {
 def ablation_request(task: Task, dataset: Dataset, training: tuple[SceneSource, ...]) -> Request:
     """Return the request for raw maps of matching-Nets that are trained alike, on different channels."""
     configs = {
-        method: Config.load(task.config, [*task.settings, f"channels.use={_as_list(channels)}"])
-        for method, channels in ABLATION.items()
+        method: task.and_settings({"channels.use": channels}).configuration() for method, channels in ABLATION.items()
     }
     return Request(dataset, configs, "disparity", train=True, training=training, also=("truth",))
 
@@ -34,7 +33,3 @@ def ablation_rows(result: Result) -> Iterator[Row]:
         if made.step.product == "disparity":
             judged = Judged(made.step.scene, result.store.read(truths[made.step.scene]))
             yield from raw_rows(judged, variant, result.store.read(made.key)["disparity"])
-
-
-def _as_list(channels: Iterable[str]) -> str:
-    return "[" + ", ".join(f'"{channel}"' for channel in channels) + "]"

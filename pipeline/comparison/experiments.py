@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.datasets import Dataset, open_dataset
-from semidense.pipeline.api import Result, Task, carry_out
+from semidense.pipeline.api import Task, carry_out
 from semidense.pipeline.comparison.ablation import ABLATION, ablation_request, ablation_rows
 from semidense.pipeline.comparison.paper_figures import NAMED
 from semidense.pipeline.comparison.protocols import PROTOCOLS, protocol_requests, require_protocols
@@ -33,6 +33,7 @@ from semidense.pipeline.plan.environment import missing_packages
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.training_split import training_scenes
+from semidense.pipeline.results.result import Result
 from semidense.stages.catalog import STAGES
 from semidense.stages.stage import Arrays
 

@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from semidense.pipeline.api import Result
 from semidense.pipeline.files.file_names import safe_names
 from semidense.pipeline.plan.plan import Made, Planned
 from semidense.pipeline.plan.steps import SPLIT, Step
+from semidense.pipeline.results.result import Result
 
 _THRESHOLD = "semidense.R="
 

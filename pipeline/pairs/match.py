@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from semidense.datasets import Calibration, Dataset, DisparityRange, SceneSource, open_dataset
 from semidense.datasets.pairs.arrays import array_pair
 from semidense.datasets.pairs.pair import PairOptions, pair_spec
-from semidense.pipeline.api import Result, Task, run
+from semidense.pipeline.api import Task, run
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import findings
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.steps import SPLIT
+from semidense.pipeline.results.result import Result
 from semidense.stages.disparity import depth as geometry
 from semidense.stages.evaluation.calibration.table import Outcome, Table, outcome
 
@@ -289,10 +290,8 @@ def match_all(
     workers: int | None = None,
 ) -> list[Match]:
     """Match every pair of a dataset; as `match`, with a ``Task`` for what all verbs share."""
-    task = replace(task, settings=(*task.settings, *wishes.settings))
-    dataset = open_dataset(task.dataset) if isinstance(task.dataset, str) else task.dataset
-    dataset = dataset.select(task.scenes) if task.scenes else dataset
-    task = replace(task, dataset=dataset)
+    dataset = task.open()
+    task = replace(task.and_settings(wishes.settings), dataset=dataset)
     others = [look(task, watch, workers)]
     result = run(task, wishes.product, watch=watch, scheduler=scheduler, workers=workers)
     if wishes.right_view:

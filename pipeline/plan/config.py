@@ -6,6 +6,7 @@ defaults, a TOML file, ``section.field=value`` settings.
 
 import difflib
 import json
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -19,6 +20,10 @@ from semidense.stages.catalog import STAGES
 from semidense.stages.stage import NoParams, Params
 
 P = TypeVar("P", bound=Params)
+Settings = Mapping[str, object] | Iterable[str] | str
+"""Settings as people type them: ``{"semidense.R": 0.8}``, ``"semidense.R=0.8"`` or several of the latter."""
+_VALUE = re.compile(r'(?:\[[^\]]*\]|"[^"]*"|[^,])+')
+"""One of several values."""
 CHOICES = ("weights", "use")
 """Sections with a field a product, each empty by default."""
 
@@ -82,9 +87,9 @@ class Config(BaseModel):
                 is not of the field's type and range.
         """
         tree = _read_toml(file) if file else {}
-        for setting in settings:
-            _merge(tree, setting)
         model = _model(tuple(STAGES))
+        for setting in settings:
+            _merge(tree, setting, model)
         _refuse_unknown(tree, model)
         try:
             return model.model_validate(tree)
@@ -123,6 +128,45 @@ def _read_toml(file: Path) -> dict[str, Any]:
         raise UsageError(f"configuration {file}: {getattr(error, 'strerror', None) or error}") from None
 
 
+def setting_texts(settings: Settings) -> tuple[str, ...]:
+    """Return settings as ``section.field=value``, as they are typed on the command line.
+
+    >>> setting_texts({"semidense.R": 0.8, "channels.use": ["gray"], "costvolume.mode": "fast"})
+    ('semidense.R=0.8', 'channels.use=["gray"]', 'costvolume.mode="fast"')
+    >>> setting_texts("semidense.R=0.8")
+    ('semidense.R=0.8',)
+
+    Raises:
+        UsageError: if a value is none that a configuration can hold.
+    """
+    if isinstance(settings, str):
+        return (settings,)
+    if not isinstance(settings, Mapping):
+        return tuple(settings)
+    return tuple(f"{name}={value_text(name, value)}" for name, value in settings.items())
+
+
+def value_text(name: str, value: object) -> str:
+    """Return a setting's value as ``parse_value`` reads it: JSON.
+
+    Raises:
+        UsageError: if JSON has no such value.
+    """
+    try:
+        return json.dumps(value, default=_plain)
+    except (TypeError, ValueError):
+        raise UsageError(f"setting {name} = {value!r}: give a number, a text, true, false or a list of them") from None
+
+
+def _plain(value: object) -> object:
+    """Return a path, a tuple's kin or NumPy's number as JSON knows it."""
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError
+
+
 def parse_setting(setting: str) -> tuple[str, str, str]:
     """Split ``section.field=value``.
 
@@ -136,19 +180,36 @@ def parse_setting(setting: str) -> tuple[str, str, str]:
     return section, field, value.strip()
 
 
-def _merge(tree: dict[str, Any], setting: str) -> None:
+def _merge(tree: dict[str, Any], setting: str, model: type[Config]) -> None:
     section, field, value = parse_setting(setting)
     if not isinstance(tree.setdefault(section, {}), dict):
         raise UsageError(f"configuration: [{section}] must be a table of fields")
-    tree[section][field] = parse_value(value)
+    tree[section][field] = parse_value(value, several="tuple" in str(_annotation(model, section, field)))
 
 
-def parse_value(text: str) -> object:
-    """Return what a setting's text means: JSON where it is JSON, several words where it has commas, else the text."""
+def _annotation(model: type[Config], section: str, field: str) -> object:
+    """Return the type of a setting; None if there is no such one."""
+    known = model.model_fields.get(section)
+    found = getattr(known.annotation, "model_fields", {}).get(field) if known else None
+    return found.annotation if found else None
+
+
+def parse_value(text: str, several: bool = True) -> object:
+    """Return what a setting's text means: JSON where it is JSON, else the text; of ``several``, its parts at commas."""
     try:
         return json.loads(text)
-    except json.JSONDecodeError:
-        return text.split(",") if "," in text else text
+    except (json.JSONDecodeError, RecursionError):
+        return text.split(",") if several and "," in text else text
+
+
+def alternatives(setting: str) -> list[str]:
+    """Return ``section.field=v1,v2`` as one setting a value; commas in brackets and quotes belong to their value.
+
+    >>> alternatives('channels.use=["gray","rank"],["gray"]')
+    ['channels.use=["gray","rank"]', 'channels.use=["gray"]']
+    """
+    section, name, values = parse_setting(setting)
+    return [f"{section}.{name}={value}" for value in _VALUE.findall(values) or [""]]
 
 
 def _refuse_unknown(tree: Mapping[str, Any], model: type[Config]) -> None:

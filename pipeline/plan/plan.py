@@ -19,7 +19,7 @@ from semidense.pipeline.plan.steps import Graph, Request, Step, build, products
 State = Literal["hit", "made", "stale", "missing"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Planned:
     """A step and what the cache has for it.
 
@@ -44,8 +44,12 @@ class Planned:
     seconds: float | None = None
     causes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """Return product, scene and state."""
+        return f"<{self.step.name}: {self.state}>"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Made:
     """A product that is there: its step, the key and digest of its entry, and whether it was there before."""
 
@@ -55,8 +59,12 @@ class Made:
     seconds: float
     reused: bool
 
+    def __repr__(self) -> str:
+        """Return product, scene and what became of it."""
+        return f"<{self.step.name}: {'reused' if self.reused else 'made'}>"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Plan:
     """The steps of a run in order, and what was asked for.
 
@@ -71,6 +79,10 @@ class Plan:
     targets: tuple[tuple[str, str], ...]
     notes: tuple[str, ...] = ()
     forced: frozenset[str] = frozenset()
+
+    def __repr__(self) -> str:
+        """Return how much there is and how much is to be made."""
+        return f"<Plan: {len(self.steps)} products, {len(self.todo())} to make>"
 
     def todo(self) -> tuple[Planned, ...]:
         """Return the steps that are to be made."""

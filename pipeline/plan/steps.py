@@ -44,7 +44,7 @@ def place(product: str) -> int:
     return [*products(), product].index(product)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Step:
     """One product of one scene, or of the training split.
 
@@ -73,6 +73,10 @@ class Step:
     code: Mapping[str, str]
     environment: Mapping[str, str]
     R: float | None = None
+
+    def __repr__(self) -> str:
+        """Return product and scene."""
+        return f"<Step {self.name}>"
 
     @property
     def product(self) -> str:

@@ -25,8 +25,9 @@ from benchmarks import (
 )
 from benchmarks.harness import Ratio, compare
 from semidense.datasets import open_dataset
-from semidense.pipeline.api import Result, Task, run
+from semidense.pipeline.api import Task, run
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.results.result import Result
 from semidense.stages.matching.net import MatchingNet
 from semidense.stages.metrics import auc
 from tests.tiny import SETTINGS, SPEC

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from semidense.pipeline import api
-from semidense.pipeline.api import Result, Task, open_store, parse_thresholds
+from semidense.pipeline.api import Task, open_store, parse_thresholds
+from semidense.pipeline.plan.config import Settings
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.opening import open_product
+from semidense.pipeline.results.result import Result
 
 MakePair = Callable[[Path], Path]
 
@@ -147,7 +149,7 @@ def test_metrics_have_the_promised_keys(trained: Result) -> None:
 
 
 def test_a_scene_s_mask_is_told(trained: Result) -> None:
-    assert api.mask_kinds(trained) == dict.fromkeys(("test-0", "train-0", "train-1"), "exact")
+    assert trained.mask_kinds() == dict.fromkeys(("test-0", "train-0", "train-1"), "exact")
 
 
 def test_status_takes_a_dataset_s_name(trained_task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -200,3 +202,67 @@ def _config(task: Task) -> Path:
     file = Path(str(task.cache)).parent / "tiny.toml"
     file.write_text("\n".join(line for name, lines in tables.items() for line in (f"[{name}]", *lines)))
     return file
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        pytest.param({"semidense.R": 0.25, "channels.use": ("gray", "rank")}, id="a mapping"),
+        pytest.param(["semidense.R=0.25", "channels.use=gray,rank"], id="texts"),
+        pytest.param({"semidense.R": np.float64(0.25), "channels.use": ["gray", "rank"]}, id="NumPy's number"),
+    ],
+)
+def test_settings_are_taken_as_people_type_them(settings: Settings) -> None:
+    found = Task(settings=settings).configuration()
+    assert (found.semidense.R, found.channels.use) == (0.25, ("gray", "rank"))
+
+
+def test_one_text_is_one_setting_and_one_name_is_one_scene() -> None:
+    task = Task(settings="semidense.R=0.5", scenes="Teddy")
+    assert (task.settings, task.scenes) == (("semidense.R=0.5",), ("Teddy",))
+
+
+def test_a_setting_that_no_configuration_can_hold_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"^setting semidense\.R = <object"):
+        Task(settings={"semidense.R": object()})
+
+
+def test_options_refine_a_task(tmp_path: Path) -> None:
+    task = Task.of(Task("synthetic", settings="semidense.R=0.5"), cache=tmp_path, train=True)
+    assert (task.dataset, task.settings, task.cache, task.train) == ("synthetic", ("semidense.R=0.5",), tmp_path, True)
+
+
+def test_a_folder_is_a_dataset(make_pair: MakePair, tmp_path: Path) -> None:
+    pair = make_pair(tmp_path / "pair")
+    assert Task(pair).open().scenes == Task(f"middlebury:{pair}").open().scenes
+
+
+def test_a_sweep_takes_a_number_and_a_mapping(own_task: Task) -> None:
+    small = replace(own_task, scenes=("test-0",))
+    swept = api.sweep(small, R=0.1234567, over={"disparity.subpixel": [True, False]})
+    assert {row["R"] for row in swept.metrics} == {0.1234567}
+    assert len({row["variant"] for row in swept.metrics}) == 2
+
+
+def test_results_and_plans_are_one_line(trained: Result, trained_task: Task) -> None:
+    plan = api.status(trained_task)
+    texts = [repr(each) for each in (trained, plan, plan.steps[0], plan.steps[0].step, trained.find("metrics"))]
+    assert max(map(len, texts)) < 100
+    assert texts[0] == "<Result of test-0: 24 products made, 0 reused>"
+    assert texts[1:] == [
+        "<Plan: 24 products, 0 to make>", "<images of test-0: hit>", "<Step images of test-0>",
+        "<metrics of test-0: made>",
+    ]  # fmt: skip
+
+
+def test_a_notebook_gets_a_table(trained: Result) -> None:
+    page = trained._repr_html_()
+    assert page.count("<tr>") == 1 + sum(row["mask"] == "nonocc" for row in trained.metrics)
+    assert "<th>raw_bad</th>" in page and len(page) < 5000
+
+
+def test_every_verb_is_offered_under_its_name() -> None:
+    from semidense import pipeline
+
+    assert set(pipeline.__all__) <= set(dir(pipeline))
+    assert all(getattr(pipeline, name).__name__ == name for name in pipeline.__all__)

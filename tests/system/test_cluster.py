@@ -10,13 +10,14 @@ import pytest
 
 from semidense.cache import Store
 from semidense.pipeline import api
-from semidense.pipeline.api import Result, Task
+from semidense.pipeline.api import Task
 from semidense.pipeline.execution.scheduler import execute
 from semidense.pipeline.execution.watch import Unwatched
 from semidense.pipeline.plan.errors import StageFailed, StageRefused
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.steps import Graph
 from semidense.pipeline.results.opening import open_product
+from semidense.pipeline.results.result import Result
 from tests.pipeline.toy import BLURRED, chain
 from tests.tiny import TRAINED
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from semidense.pipeline.api import Result
+from semidense.pipeline.results.result import Result
 from tests.tiny import PATH, TRAINED
 
 ALL = PATH

@@ -47,14 +47,14 @@ def test_a_command_that_is_none_does_not_parse(line: str) -> None:
 
 @pytest.mark.parametrize("line", COMMANDS)
 def test_the_settings_and_thresholds_of_the_readme_are_valid(line: str) -> None:
-    from semidense.pipeline.api import _alternatives, parse_thresholds
-    from semidense.pipeline.plan.config import Config
+    from semidense.pipeline.api import parse_thresholds
+    from semidense.pipeline.plan.config import Config, alternatives
 
     arguments = shlex.split(line, comments=True)
     given = list(pairwise(arguments))
     settings = [value for name, value in given if name == "--set"]
     for setting in settings:
-        for each in _alternatives(setting) if "sweep" in arguments else [setting]:
+        for each in alternatives(setting) if "sweep" in arguments else [setting]:
             Config.load(None, [each])
     for _, value in [pair for pair in given if pair[0] == "--R"]:
         assert parse_thresholds(value)

@@ -12,8 +12,9 @@ import pytest
 import zarr
 
 from semidense.pipeline import api
-from semidense.pipeline.api import Result, Task
+from semidense.pipeline.api import Task
 from semidense.pipeline.execution.scheduler import totals
+from semidense.pipeline.results.result import Result
 from semidense.stages.catalog import STAGES
 from tests.tiny import PATH
 

@@ -53,7 +53,7 @@ def _record(entry: Entry, store: Store) -> Html:
     pairs += [(f"environment: {name}", value) for name, value in recipe.environment.items()]
     pairs += [(f"version of {name}", value) for name, value in entry.extras.get("versions", {}).items()]
     pairs += [("command", " ".join(entry.extras.get("command", []))), ("code", f"{len(recipe.code)} modules")]
-    imports = "from semidense.pipeline.api import open_product, open_store"
+    imports = "from semidense.pipeline import open_product, open_store"
     opening = f'{imports}; open_product(open_store("{store.root}"), "{entry.key}")'
     return table(["what", "value"], [list(pair) for pair in pairs], caption="its record", words=2) + tag(
         "pre", text(opening)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from semidense.pipeline.api import Result, Task, explain, open_store
+from semidense.pipeline.api import Task, explain, open_store
 from semidense.pipeline.cli.inspect import Inspection, draw, inspection, statistics
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.results.result import Result
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from semidense.pipeline.api import Result
+from semidense.pipeline.results.result import Result
 from tests.tiny import PATH, SPEC, TEST_ONLY, TRAINED
 
 Invoke = Callable[..., Any]

@@ -3,10 +3,10 @@ from pathlib import Path
 
 import pytest
 
-from semidense.pipeline.api import Result
 from semidense.pipeline.cli.console import print_sweep
 from semidense.pipeline.files.run_files import write_sweep
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.results.result import Result
 
 
 @pytest.fixture

@@ -3,9 +3,9 @@
 import numpy as np
 from matplotlib.patches import FancyArrowPatch
 
-from semidense.pipeline.api import Result
 from semidense.pipeline.figures.provenance import PIXELS, draw_graph
 from semidense.pipeline.results.provenance import ancestry
+from semidense.pipeline.results.result import Result
 
 
 def test_no_arrow_passes_behind_a_box(trained: Result) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from safetensors import safe_open
 
-from semidense.pipeline.api import Result, Task, run
+from semidense.pipeline.api import Task, run
 from semidense.pipeline.files.run_files import export
 from semidense.pipeline.files.selection import lineage
 from semidense.pipeline.pages.report.gathered import gather
@@ -17,6 +17,7 @@ from semidense.pipeline.pages.report.graph import graph
 from semidense.pipeline.pairs.match import Wishes, match, match_all
 from semidense.pipeline.plan import shipped_weights as shipped
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.results.result import Result
 from semidense.stages.evaluation.calibration.declaration import BINS
 from semidense.stages.evaluation.calibration.table import EDGES, probability
 from semidense.stages.evaluation.filtering import threshold_for_error

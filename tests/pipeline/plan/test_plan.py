@@ -10,12 +10,13 @@ import pytest
 
 from semidense.cache import Store
 from semidense.pipeline import api
-from semidense.pipeline.api import Result, Task
+from semidense.pipeline.api import Task
 from semidense.pipeline.plan import steps
 from semidense.pipeline.plan.causes import PENDING
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made, Plan
 from semidense.pipeline.plan.steps import Request
+from semidense.pipeline.results.result import Result
 from tests.pipeline.toy import CALLS, chain, changes, states
 from tests.tiny import PATH
 

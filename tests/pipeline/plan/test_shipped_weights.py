@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from semidense.pipeline import api
-from semidense.pipeline.api import Result, Task
+from semidense.pipeline.api import Task
 from semidense.pipeline.plan import shipped_weights as shipped
+from semidense.pipeline.results.result import Result
 from semidense.stages.stage import StageError
 from tests.tiny import NETS, TEST_ONLY
 

@@ -2,8 +2,8 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from semidense.pipeline.api import Result
 from semidense.pipeline.cli.cache.listing import Selection, _age, bytes_text, list_entries, verify_entries
+from semidense.pipeline.results.result import Result
 
 
 @pytest.mark.parametrize(

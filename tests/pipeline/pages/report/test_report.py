@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from semidense.pipeline.api import Result, Task
+from semidense.pipeline.api import Task
 from semidense.pipeline.pages.report import report
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.results.result import Result
 from tests.tiny import SPEC, TEST_ONLY, TRAINED
 
 Invoke = Callable[..., Any]

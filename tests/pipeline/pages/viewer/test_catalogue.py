@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from semidense.cache import Store
-from semidense.pipeline.api import Result
 from semidense.pipeline.pages.viewer.catalogue import catalogue
+from semidense.pipeline.results.result import Result
 from tests.handmade import Handmade, handmade, judge
 
 
