@@ -3,7 +3,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +17,29 @@ if TYPE_CHECKING:  # the package is imported when it is used: most tests do with
     from semidense.pipeline.results.result import Result
 
 PROJECT = Path(__file__).parents[1]
+EXPECTED_SKIPS = ("no real data in ", "this system has no /proc")
+"""How the reasons begin for which a test may be skipped in CI; any other is a failure there."""
+
+
+def unexpected_skips(reports: Iterable[pytest.TestReport | pytest.CollectReport]) -> list[str]:
+    """Return the test and the reason of each skip that CI does not expect."""
+    reasons = {
+        report.nodeid: report.longrepr[2].removeprefix("Skipped: ")
+        for report in reports
+        if isinstance(report.longrepr, tuple)
+    }
+    return [f"{test}: {reason}" for test, reason in reasons.items() if not reason.startswith(EXPECTED_SKIPS)]
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fail a run of CI that skipped what it should have run: a check that is left out quietly proves nothing."""
+    terminal = session.config.pluginmanager.get_plugin("terminalreporter")
+    if os.environ.get("CI") != "true" or terminal is None:
+        return
+    for told in unexpected_skips(terminal.stats.get("skipped", ())):
+        terminal.write_line(f"unexpected skip in CI: {told}", red=True)
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 @dataclass(frozen=True)
