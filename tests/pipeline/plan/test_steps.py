@@ -1,3 +1,4 @@
+import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -302,3 +303,51 @@ def test_no_light_falls_on_other_channels_than_gray() -> None:
     assert graph(without_gray, "matching_net.relight=0", train=True)
     with pytest.raises(UsageError, match="set descriptor_net"):
         graph(without_gray, "matching_net.relight=0", "costvolume.mode=fast", train=True)
+
+
+def test_a_product_may_be_made_by_another_stage() -> None:
+    plain, used = graph(), graph("use.disparity=sgm", "sgm.uniqueness=3")
+    made = next(step for step in used.steps.values() if step.product == "disparity")
+    assert made.stage.module == "semidense.stages.baselines.sgm"
+    assert made.settings["uniqueness"] == 3
+    assert set(counts(used)) == set(counts(plain)) - {"channels", "matching_net", "costvolume"}
+    confidence = next(step for step in used.steps.values() if step.product == "confidence")
+    assert made.id in confidence.inputs["disparity"]
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        pytest.param("use.disparity=sgmm", r"no product 'sgmm'; did you mean sgm\?", id="no such product"),
+        pytest.param("use.disparity=confidence", r"it has no array 'disparity'", id="other arrays"),
+        pytest.param("use.disparity=semidense", r"it is made from disparity", id="made from itself"),
+        pytest.param("use.disparity=matching_net", r"it has no array 'disparity'", id="not of a scene"),
+    ],
+)
+def test_a_stage_that_cannot_take_the_place_is_refused(setting: str, message: str) -> None:
+    with pytest.raises(UsageError, match=rf"^{setting.partition('=')[0]} = .*{message}"):
+        graph(setting)
+
+
+def test_own_weights_take_the_place_of_the_packages_and_of_a_training(tmp_path: Path) -> None:
+    own = tmp_path / "own.safetensors"
+    own.write_bytes(b"own")
+    for train in (False, True):
+        made = graph(f"weights.matching_net={own}", train=train)
+        (step,) = [step for step in made.steps.values() if step.product == "matching_net"]
+        assert step.settings == {"shipped": hashlib.sha256(b"own").hexdigest()}
+        assert step.inputs == {}, "nothing is learnt"
+
+
+def test_weights_that_are_not_there_are_named(tmp_path: Path) -> None:
+    with pytest.raises(StageError, match=rf"^weights\.matching_net = {tmp_path}/none: No such file"):
+        graph(f"weights.matching_net={tmp_path}/none")
+
+
+def test_weights_that_change_after_planning_are_refused(tmp_path: Path) -> None:
+    own = tmp_path / "own.safetensors"
+    own.write_bytes(b"own")
+    planned = shipped.own_weights("matching_net", own)
+    own.write_bytes(b"other")
+    with pytest.raises(StageError, match="the weights have changed since the run was planned"):
+        planned.read()
