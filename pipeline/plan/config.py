@@ -32,10 +32,10 @@ class TrainingParams(Params):
     """What is trained, and on what. In no key: the scenes and networks themselves are, by their content."""
 
     dataset: str | None = Field(
-        None, description="dataset whose training scenes are learnt from; default: the dataset of the run"
+        None, description="dataset whose training scenes are used; default: the dataset of the run"
     )
     shipped: tuple[Literal["matching_net", "descriptor_net"], ...] = Field(
-        (), description="networks that a training takes as they come with the package"
+        (), description="networks that --train does not train but takes from the package"
     )
 
 

@@ -56,8 +56,10 @@ class SgmParams(RangeParams):
     window: int = Field(3, ge=1, le=11, description="side of the matched block, px, odd")
     p1: int = Field(72, ge=0, description="penalty of a step of 1 px between neighbours")
     p2: int = Field(288, ge=1, description="penalty of a larger step; above p1")
-    uniqueness: int = Field(10, ge=0, le=100, description="percent by which the best cost must beat the next")
-    speckle: int = Field(100, ge=0, description="pixels up to which a patch of its own disparity is dropped; 0: none")
+    uniqueness: int = Field(10, ge=0, le=100, description="percent by which the best cost must be lower than the next")
+    speckle: int = Field(
+        100, ge=0, description="size of the largest isolated patch that is dropped, px; 0: drop no patch"
+    )
     tolerance: int = Field(1, ge=0, description="largest left-right difference that is kept, px")
 
     @field_validator("window")
@@ -151,11 +153,11 @@ COST_CONFIDENCE = Stage(
 class ForestParams(Params):
     """The random forest of O1 and what it learns from."""
 
-    samples: int = Field(100_000, ge=2, description="pixels to learn from, over the scenes in equal parts")
-    trees: int = Field(10, ge=1, le=1000, description="trees")
-    depth: int = Field(25, ge=1, le=100, description="deepest level of a tree")
-    tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
-    seed: int = Field(0, ge=0, description="seed of the draw and of the trees")
+    samples: int = Field(100_000, ge=2, description="number of pixels to learn from, the same from every scene")
+    trees: int = Field(10, ge=1, le=1000, description="number of trees")
+    depth: int = Field(25, ge=1, le=100, description="depth of a tree, at most")
+    tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as correct, px")
+    seed: int = Field(0, ge=0, description="seed of the random draw and of the trees")
 
 
 class CcnnParams(Schedule):
@@ -163,8 +165,10 @@ class CcnnParams(Schedule):
 
     peak_rate: float = Field(0.002, gt=0, description="highest learning rate")
     crop: int = Field(64, ge=1, le=512, description="side of a training crop, px")
-    batch: int = Field(4, ge=SHARDS, multiple_of=SHARDS, description="crops a step; a multiple of the number of shards")
-    tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
+    batch: int = Field(
+        4, ge=SHARDS, multiple_of=SHARDS, description="crops in one step; a multiple of the number of shards"
+    )
+    tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as correct, px")
     seed: int = Field(0, ge=0, description="seed of the weights and the crops")
 
 

@@ -8,7 +8,10 @@ from semidense.stages.stage import Output, Params, Stage
 class DisparityParams(Params):
     """How a disparity is read off the cost volume."""
 
-    subpixel: bool = Field(default=False, description="refine by a parabola through three costs; off in the paper")
+    subpixel: bool = Field(
+        default=False,
+        description="refine the disparity below a pixel, by a parabola through three costs; off in the paper",
+    )
 
 
 DISPARITY = Stage(
@@ -26,9 +29,11 @@ the rows of one chunk of the volume, so that each chunk is read once."""
 class RefinedParams(Params):
     """What is done to the filtered map; nothing by default."""
 
-    left_right: bool = Field(False, description="drop what the right view's own map contradicts")
-    tolerance: float = Field(1.0, ge=0, description="largest difference of the two maps that is none, px (left_right)")
-    subpixel: bool = Field(False, description="move each disparity to the parabola's lowest point")
+    left_right: bool = Field(False, description="drop disparities that the right view's own map contradicts")
+    tolerance: float = Field(1.0, ge=0, description="largest left-right difference that still counts as agreement, px")
+    subpixel: bool = Field(
+        False, description="refine each disparity below a pixel, to the lowest point of a parabola through three costs"
+    )
 
     @property
     def inputs(self) -> tuple[str, ...]:

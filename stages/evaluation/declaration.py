@@ -19,13 +19,17 @@ STRIDE = 16
 class EvaluationSamplesParams(Params):
     """What the evaluation-Net learns from."""
 
-    form: Literal["strided", "patch"] = Field("strided", description="grids of pixels, or the paper's single pixels")
-    samples: int = Field(16000, ge=1, description="grids in all, over the maps in equal parts (strided)")
+    form: Literal["strided", "patch"] = Field(
+        "strided", description="strided: grids of pixels; patch: the paper's single pixels"
+    )
+    samples: int = Field(16000, ge=1, description="number of grids, the same from every map (strided)")
     rows: int = Field(12, ge=1, le=64, description="rows of a grid, 16 px apart (strided)")
     columns: int = Field(16, ge=1, le=64, description="columns of a grid, 16 px apart (strided)")
-    mirror: bool = Field(True, description="learn from the right views' maps too, mirrored, where their truth is known")
-    tolerance: float = Field(1.0, gt=0, description="T_e: largest error of a disparity that counts as right, px")
-    seed: int = Field(0, ge=0, description="seed of the draw")
+    mirror: bool = Field(
+        True, description="also learn from the right views' maps, mirrored, where their truth is known"
+    )
+    tolerance: float = Field(1.0, gt=0, description="T_e: largest error of a disparity that counts as correct, px")
+    seed: int = Field(0, ge=0, description="seed of the random draw")
 
 
 class EvaluationNetParams(Schedule):
@@ -34,12 +38,18 @@ class EvaluationNetParams(Schedule):
     steps: int = Field(1600, ge=1, description="optimiser steps")
     peak_rate: float = Field(0.002, gt=0, description="highest learning rate")
     batch: int = Field(
-        8, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"
+        8, ge=SHARDS, multiple_of=SHARDS, description="samples in one step; a multiple of the number of shards"
     )
-    flip: bool = Field(True, description="turn half of the samples upside down")
-    relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting; 0: none, as the paper")
-    prior: bool = Field(True, description="count with the samples' share of right disparities; false: with a half")
-    precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
+    flip: bool = Field(True, description="turn half of the samples upside down at random")
+    relight: float = Field(
+        1.0, ge=0, le=3, description="strength of the random change of light; 0: no change, as in the paper"
+    )
+    prior: bool = Field(
+        True, description="use the share of correct disparities in the samples as the prior; false: use 0.5"
+    )
+    precision: Precision = Field(
+        "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
+    )
     seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
 
 
@@ -47,17 +57,24 @@ class ConfidenceParams(Params):
     """How the evaluation-Net runs, and how much the map's agreement weighs beside it."""
 
     agreement: float = Field(
-        4.0, ge=0, le=100, description="weight of the map's agreement, a power of it; 0 is the paper"
+        4.0,
+        ge=0,
+        le=100,
+        description="weight of the agreement with neighbours, as a power; 0: the network alone, as in the paper",
     )
     typical: float = Field(
         0.82,
         gt=0,
         le=1,
-        description="agreement that leaves the odds as they are: that of right disparities in training",
+        description="agreement that leaves the confidence as it is: the mean of correct disparities in training",
     )
-    window: int = Field(25, ge=3, le=PATCH, description="side of the window of the agreement, px, odd")
-    flipped: bool = Field(False, description="look upside down too, and take the mean; twice the time")
-    precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
+    window: int = Field(25, ge=3, le=PATCH, description="side of the window in which neighbours are compared, px, odd")
+    flipped: bool = Field(
+        False, description="also score the image upside down, and take the mean; takes twice the time"
+    )
+    precision: Precision = Field(
+        "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
+    )
 
     @field_validator("window")
     @classmethod

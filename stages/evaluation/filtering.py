@@ -13,17 +13,19 @@ from semidense.stages.stage import Arrays, Inputs, Output, Params, Stage, StageE
 class SemidenseParams(Params):
     """How much confidence a disparity needs."""
 
-    R: float = Field(default=0.9, ge=0, le=1, description="least confidence that is kept; 0.9 in the paper")
+    R: float = Field(default=0.9, ge=0, le=1, description="smallest confidence that is kept; 0.9 in the paper")
     density: float | None = Field(
-        default=None, gt=0, le=1, description="share of the image's pixels to keep, the most confident; replaces R"
+        default=None, gt=0, le=1, description="keep this share of the image, the most confident pixels; replaces R"
     )
     max_error: float | None = Field(
         default=None,
         gt=0,
         lt=1,
-        description="share of wrong pixels to expect among the kept, by their calibrated confidences; replaces R",
+        description="share of wrong pixels that is expected among the kept ones; replaces R",
     )
-    calibrated: bool = Field(default=False, description="R is a calibrated probability (calibrated_confidence)")
+    calibrated: bool = Field(
+        default=False, description="take R as a calibrated probability (product calibrated_confidence)"
+    )
 
     @property
     def by_R(self) -> bool:  # noqa: N802 - the paper's name

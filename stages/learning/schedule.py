@@ -15,11 +15,15 @@ class Schedule(Params):
     """How long and how fast a network learns."""
 
     steps: int = Field(1500, ge=1, description="optimiser steps")
-    optimiser: Literal["muon", "adam"] = Field("muon", description="what makes a step of a large kernel's gradient")
+    optimiser: Literal["muon", "adam"] = Field(
+        "muon", description="optimiser of the large kernels: muon or adam; the other parameters use adam"
+    )
     peak_rate: float = Field(0.004, gt=0, description="highest learning rate; the paper's is 0.002")
     last_rate: float = Field(0.0001, gt=0, description="learning rate of the last step")
-    warm_up: float = Field(0.08, ge=0, lt=1, description="share of the steps in which the rate rises; 0: none")
-    clip: float = Field(1.0, gt=0, description="largest norm of a step's gradient")
+    warm_up: float = Field(
+        0.08, ge=0, lt=1, description="share of the steps in which the learning rate rises; 0: it starts at its peak"
+    )
+    clip: float = Field(1.0, gt=0, description="largest norm of the gradient; a larger one is scaled down")
     checkpoint_steps: int = Field(50, ge=1, description="steps between two checkpoints", exclude=True)
 
     def rate(self, step: int) -> float:

@@ -25,13 +25,17 @@ MARGIN = 4 + REACH
 class MatchingSamplesParams(Params):
     """What the matching-Net learns from."""
 
-    form: Form = Field("dense", description="dense crops, or the paper's patches")
-    samples: int = Field(18000, ge=1, description="samples in all, over the scenes in equal parts")
+    form: Form = Field(
+        "dense", description="dense: crops of many pixels and disparities; patch: the paper's single patches"
+    )
+    samples: int = Field(18000, ge=1, description="number of samples, the same from every scene")
     height: int = Field(16, ge=1, le=256, description="rows of a dense crop, px")
     width: int = Field(32, ge=1, le=256, description="columns of a dense crop, px")
-    slots: int = Field(12, ge=3, le=512, description="most disparities a dense crop is compared at")
-    mirror: bool = Field(True, description="mirror half of the samples where the right view has a truth")
-    seed: int = Field(0, ge=0, description="seed of the draw")
+    slots: int = Field(12, ge=3, le=512, description="disparities at which a dense crop is compared, at most")
+    mirror: bool = Field(
+        True, description="take half of the samples from mirrored, exchanged views where the right view has a truth"
+    )
+    seed: int = Field(0, ge=0, description="seed of the random draw")
 
     @property
     def crop(self) -> tuple[int, int]:
@@ -51,11 +55,18 @@ class MatchingNetParams(Schedule):
     steps: int = Field(4500, ge=1, description="optimiser steps")
     head: Head = Field("compact", description="hidden layers: 128 units, or the paper's 1600 and 128")
     batch: int = Field(
-        4, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"
+        4, ge=SHARDS, multiple_of=SHARDS, description="samples in one step; a multiple of the number of shards"
     )
-    ranking: float = Field(4.0, ge=0, description="weight of the ranking loss; 0: none, as the paper")
-    relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting a view; 0: none, as the paper")
-    precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
+    ranking: float = Field(4.0, ge=0, description="weight of the ranking loss; 0: no ranking loss, as in the paper")
+    relight: float = Field(
+        1.0,
+        ge=0,
+        le=3,
+        description="strength of the random change of light in each view; 0: no change, as in the paper",
+    )
+    precision: Precision = Field(
+        "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
+    )
     seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
 
 
@@ -66,11 +77,15 @@ class DescriptorNetParams(Schedule):
     steps: int = Field(9000, ge=1, description="optimiser steps")
     peak_rate: float = Field(0.008, gt=0, description="highest learning rate")
     batch: int = Field(
-        8, ge=SHARDS, multiple_of=SHARDS, description="samples a step; a multiple of the number of shards"
+        8, ge=SHARDS, multiple_of=SHARDS, description="samples in one step; a multiple of the number of shards"
     )
-    ranking: float = Field(4.0, ge=0, description="weight of the ranking loss; 0: none")
-    relight: float = Field(1.0, ge=0, le=3, description="strength of the random lighting a view; 0: none")
-    precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
+    ranking: float = Field(4.0, ge=0, description="weight of the ranking loss; 0: no ranking loss")
+    relight: float = Field(
+        1.0, ge=0, le=3, description="strength of the random change of light in each view; 0: no change"
+    )
+    precision: Precision = Field(
+        "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
+    )
     seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
 
 
@@ -79,11 +94,19 @@ class CostVolumeParams(Params):
 
     d_min: int | None = Field(None, description="smallest disparity, px; default: the scene's own")
     d_max: int | None = Field(None, description="largest disparity, px; default: the scene's own")
-    precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
-    mode: Mode = Field(
-        "exact", description="every cell, those alone that descriptors propose, or products of descriptors"
+    precision: Precision = Field(
+        "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
     )
-    votes: int = Field(24, ge=1, le=144, description="pixels a proposal needs, of 144 in and around a tile")
+    mode: Mode = Field(
+        "exact",
+        description="exact: every cell by the matching-Net; guided: only proposed cells; fast: products of descriptors",
+    )
+    votes: int = Field(
+        24,
+        ge=1,
+        le=144,
+        description="pixels that must propose a disparity before it is computed, of 144 in and around a tile (guided)",
+    )
 
     @property
     def context(self) -> int:

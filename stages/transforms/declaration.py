@@ -18,12 +18,14 @@ class ChannelsParams(Params):
 
     rank_window: int = Field(default=31, ge=3, description="side of the rank window, px, odd")
     companion_window: int = Field(default=61, ge=3, description="side of the companion window, px, odd")
-    companion_rays: int = Field(default=8, description="rays of the companion: 4, 8 or 16")
+    companion_rays: int = Field(default=8, description="number of rays of the companion transform: 4, 8 or 16")
     gray: Literal["standardized", "raw"] = Field(
         default="standardized",
-        description="gray channel: (gray - mean) / max(std, 1) over the whole view, or gray / 255",
+        description="scale the gray channel to (gray - mean) / max(std, 1) of the whole view; false: to gray / 255",
     )
-    use: tuple[Channel, ...] = Field(default=ORDER, min_length=1, description="channels to make; always in this order")
+    use: tuple[Channel, ...] = Field(
+        default=ORDER, min_length=1, description="channels that the networks see, in the order gray, rank, companion"
+    )
 
     @field_validator("rank_window", "companion_window")
     @classmethod

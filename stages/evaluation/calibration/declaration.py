@@ -16,11 +16,14 @@ class CalibrationParams(Params):
     """How it is found out what the confidence is worth."""
 
     folds: int = Field(
-        2, ge=2, le=10, description="parts of the training scenes; each is scored by networks that learnt the others"
+        2,
+        ge=2,
+        le=10,
+        description="number of parts of the training scenes; networks of the other parts score each",
     )
-    tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
+    tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as correct, px")
     fold_of_scene: tuple[int, ...] | None = Field(
-        None, description="part of each training scene; default: alternating, Cloth1 and Cloth2 never apart"
+        None, description="part of each training scene; default: in turn, scenes like Cloth1 and Cloth2 together"
     )
 
 
