@@ -1,8 +1,10 @@
 """Hash the source that a result depends on, so that a helper's change makes it stale and a comment does not.
 
 Followed are import statements anywhere in a file, relative ones too, ``import_module`` with a
-literal name, and the ``__init__`` of every parent package, which Python runs first. Not followed
-is a submodule that is only reached as an attribute and that another module imports.
+literal name, and the ``__init__`` of every parent package, which Python runs first. What stands
+under ``if TYPE_CHECKING`` never runs; it tells where a package's names come from that are imported
+when they are used, and those that a file takes are followed. Not followed is a submodule that is
+only reached as an attribute and that another module imports.
 Modules are found and parsed, never imported.
 """
 
@@ -13,6 +15,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
+from typing import TypeGuard
 
 from semidense.cache.document import digest
 from semidense.cache.errors import SourceNotFound
@@ -165,16 +168,58 @@ class _Bare(ast.NodeTransformer):
 
 def _imports(tree: ast.AST, module: _Module) -> Iterator[str]:
     """Yield each dotted name that might be a module imported here; names that are none are harmless."""
-    for node in ast.walk(tree):
+    for node in _running(tree):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            for alias in node.names:
+                yield from (alias.name, *_offered(alias.name).values())
         elif isinstance(node, ast.ImportFrom):
             base = _absolute("." * node.level + (node.module or ""), module)
             yield base
             for alias in node.names:
-                yield from _submodules(base) if alias.name == "*" else (f"{base}.{alias.name}",)
+                yield from _submodules(base) if alias.name == "*" else _named(base, alias.name)
         elif isinstance(node, ast.Call) and (name := _literal_import(node)):
             yield _absolute(name, module)
+
+
+def _named(base: str, name: str) -> Iterator[str]:
+    """Yield what ``from base import name`` may import: a module, all that it offers, or what ``base`` takes it from."""
+    yield f"{base}.{name}"
+    yield from _offered(f"{base}.{name}").values()
+    yield from [home] if (home := _offered(base).get(name)) else []
+
+
+def _running(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield the nodes of a tree that may run: not what is there for type checkers alone."""
+    for node in ast.iter_child_nodes(tree):
+        if _for_checkers(node):
+            yield from (each for part in node.orelse for each in (part, *_running(part)))
+        else:
+            yield node
+            yield from _running(node)
+
+
+def _for_checkers(node: ast.AST) -> TypeGuard[ast.If]:
+    test = node.test if isinstance(node, ast.If) else None
+    return getattr(test, "attr", getattr(test, "id", None)) == "TYPE_CHECKING"
+
+
+@cache
+def _offered(package: str) -> Mapping[str, str]:
+    """Return the names that a package imports when they are used, with the modules that they come from."""
+    located = _locate(package)
+    if not located or not located.file or not located.folders:
+        return {}
+    try:
+        tree = ast.parse(located.file.read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        return {}  # reading the package itself says what is wrong
+    blocks = (node.body for node in tree.body if _for_checkers(node))
+    nodes = [node for body in blocks for node in body if isinstance(node, ast.ImportFrom)]
+    return {
+        alias.asname or alias.name: _absolute("." * node.level + (node.module or ""), located)
+        for node in nodes
+        for alias in node.names
+    }
 
 
 def _absolute(name: str, module: _Module) -> str:

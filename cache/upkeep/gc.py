@@ -7,8 +7,8 @@ killed in between, it leaves a draft of a dead process, which the next run sweep
 import json
 import os
 import time
-from collections.abc import Container, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -38,11 +38,13 @@ class Limits:
             deleted for being unreachable, and age and size alone decide.
         seconds: entries unused for longer may go; None: age does not matter.
         bytes: entries go, longest unused first, until no more is left; None: size does not matter.
+        useless: keys of entries that can never be used again, with the reason: these go whatever else is asked for.
     """
 
     keep: frozenset[str] | None = None
     seconds: float | None = None
     bytes: int | None = None
+    useless: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -107,11 +109,12 @@ def last_used(layout: Layout, key: str) -> float:
         return 0.0
 
 
-def _chosen(layout: Layout, entries: Iterable[Entry], limits: Limits) -> Iterator[tuple[str, str]]:
+def _chosen(layout: Layout, entries: Collection[Entry], limits: Limits) -> Iterator[tuple[str, str]]:
     """Yield the key of each entry that may go, with the reason, longest unused first."""
-    if limits == Limits():
+    yield from ((entry.key, limits.useless[entry.key]) for entry in entries if entry.key in limits.useless)
+    if limits.keep is None and limits.seconds is None and limits.bytes is None:
         return
-    now, entries = time.time(), list(entries)
+    now, entries = time.time(), [entry for entry in entries if entry.key not in limits.useless]
     left = sum(entry.size for entry in entries)
     free = [entry for entry in entries if limits.keep is None or entry.key not in limits.keep]
     unreachable = "not reached by what is to be kept; " if limits.keep is not None else ""

@@ -3,8 +3,13 @@
 from functools import cache
 from importlib import metadata
 
+from semidense.cache import Entry
+from semidense.cache.keys.code import source_text
 from semidense.pipeline.plan.errors import UsageError
 from semidense.stages.stage import Stage
+
+FORMER = ("pipeline", "stages", "datasets", "cache")
+"""Top-level packages of this distribution up to version 0.1."""
 
 
 @cache
@@ -25,6 +30,17 @@ def environment(stage: Stage) -> dict[str, str]:
             f"{stage.product} needs {' and '.join(missing)}: pip install 'semidense-stereo[baselines]' brings it"
         )
     return core | {name: version(name) for name in stage.needs}
+
+
+def former_version(entry: Entry) -> str | None:
+    """Return the version that made an entry which this one can never use again; None for all others.
+
+    Keys hold the names of modules: an entry whose code lies in a module of ours that is gone is of another version.
+    """
+    ours = [name for name in entry.recipe.code if name.partition(".")[0] in ("semidense", *FORMER)]
+    if all(name.startswith("semidense") and source_text(name) is not None for name in ours):
+        return None
+    return str(entry.extras.get("versions", {}).get("semidense-stereo", "unknown"))
 
 
 def missing_packages(stage: Stage) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from typing import Literal
 from semidense.cache import ABSENT, Change, Entry, Recipe, Store, differences
 from semidense.pipeline.plan.causes import PENDING, Causes
 from semidense.pipeline.plan.config import nearest
+from semidense.pipeline.plan.environment import former_version, version
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.steps import Graph, Request, Step, build, products
 
@@ -155,8 +156,11 @@ class _Planner:
 
     def _changes(self, step: Step, recipe: Recipe) -> tuple[Change, ...]:
         """Return how a recipe differs from the nearest earlier one of the same label."""
-        candidates: list[list[Change]] = [differences(entry.recipe, recipe) for entry in self._earlier(step)]
-        return _fewest(candidates)
+        earlier = self._earlier(step)
+        usable = [entry for entry in earlier if former_version(entry) is None]
+        if earlier and not usable:
+            return (Change("version", former_version(earlier[0]), version("semidense-stereo")),)
+        return _fewest([differences(entry.recipe, recipe) for entry in usable])
 
     def _pending(self, step: Step, open_inputs: Mapping[str, tuple[str, ...]]) -> tuple[Change, ...]:
         """Return the step's own changes, and the inputs that are to be made before it."""

@@ -6,6 +6,7 @@ from pydantic_core import to_jsonable_python
 
 from semidense.cache import Entry
 from semidense.pipeline.plan.config import Config
+from semidense.pipeline.plan.environment import former_version
 
 DEFAULTS = "defaults"
 
@@ -21,6 +22,8 @@ class Belonging:
 
     def text(self, entry: Entry) -> str:
         """Return the settings, such as ``channels.rank_window=15 semidense.R=0.8``, or that they are the defaults."""
+        if version := former_version(entry):
+            return f"of version {version}"
         return " ".join(sorted(self._settings(entry))) or DEFAULTS
 
     def _settings(self, entry: Entry) -> frozenset[str]:

@@ -12,6 +12,7 @@ from semidense.cache import Store
 from semidense.cache.upkeep.gc import Item, Limits, Survey, collect, survey
 from semidense.pipeline.api import Task, open_store, status
 from semidense.pipeline.cli.console import print_json
+from semidense.pipeline.plan.environment import former_version
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Planned
 from semidense.pipeline.results.text import bytes_text, results
@@ -43,9 +44,8 @@ class Wish:
             raise UsageError("--config and --train say how a dataset is kept: name it with --keep DATASET")
         seconds = _amount(self.unused_for, _UNITS, "--unused-for", "30d, 12h, 5min")
         largest = _amount(self.max_size, _BYTES, "--max-size", "20GB, 500MB")
-        return Limits(
-            frozenset(self._reached(folder)) if self.keep else None, seconds, None if largest is None else int(largest)
-        )
+        reached = frozenset(self._reached(folder)) if self.keep else None
+        return Limits(reached, seconds, None if largest is None else int(largest), _useless(open_store(folder)))
 
     def _reached(self, folder: Path | None) -> Iterator[str]:
         """Yield the keys that the datasets reach, each with each configuration."""
@@ -54,6 +54,12 @@ class Wish:
             for config in self.configs or (None,):
                 for planned in status(Task(dataset, config=config, train=self.train, cache=folder)).steps:
                     yield from [planned.key] if planned.key else _possible(store, planned)
+
+
+def _useless(store: Store) -> dict[str, str]:
+    """Return the entries that another version made and this one cannot use, with the reason."""
+    versions = {entry.key: former_version(entry) for entry in store.entries()}
+    return {key: f"made by version {version}, whose code is gone" for key, version in versions.items() if version}
 
 
 def _possible(store: Store, planned: Planned) -> Iterator[str]:

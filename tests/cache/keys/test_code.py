@@ -136,6 +136,30 @@ def test_each_import_form_is_followed(tree: Tree, statement: str) -> None:
     assert {name for name in before if before[name] != after[name]} == {f"{package}.sub.helper"}
 
 
+OFFERING = (
+    "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from PKG.lazy.one import f\n    from .two import g\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("statement", "followed"),
+    [
+        pytest.param("from PKG.lazy import f", {"one"}, id="the name's own module"),
+        pytest.param("from .lazy import g", {"two"}, id="the same of a relative name"),
+        pytest.param("from PKG import lazy", {"one", "two"}, id="all that the package offers"),
+        pytest.param("import PKG.lazy", {"one", "two"}, id="imported as a whole"),
+        pytest.param("import typing\nif typing.TYPE_CHECKING:\n    from PKG.lazy import f", set(), id="never runs"),
+        pytest.param("if TYPE_CHECKING:\n    pass\nelse:\n    from PKG.lazy import f", {"one"}, id="the other branch"),
+    ],
+)
+def test_names_that_are_imported_when_they_are_used_are_followed_to_their_modules(
+    tree: Tree, statement: str, followed: set[str]
+) -> None:
+    package = tree({"m.py": statement, "lazy/__init__.py": OFFERING, "lazy/one.py": "", "lazy/two.py": ""})
+    parts = code_parts(f"{package}.m", (package,))
+    assert {name.rpartition(".")[2] for name in parts} & {"one", "two"} == followed
+
+
 def test_parent_packages_count(tree: Tree) -> None:
     package = tree({"__init__.py": "from .setup import X", "setup.py": "X = 1", "sub/__init__.py": "", "sub/m.py": ""})
     parts = code_parts(f"{package}.sub.m", (package,))

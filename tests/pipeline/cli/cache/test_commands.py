@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from semidense.cache import Store, code_hash_of
+from semidense.cache import Recipe, Store, code_hash_of
 from semidense.pipeline.results.provenance import ancestry, tree_lines
 from tests.pipeline.toy import chain
 
@@ -106,3 +106,17 @@ def test_what_was_deleted_since_is_said(filled: Store) -> None:
     chain_ = ancestry(filled, key)
     assert chain_[-1].entry is None
     assert "was deleted since" in list(tree_lines(chain_))[-1]
+
+
+def test_entries_of_another_version_are_listed_as_such_and_cleaned(invoke: Invoke, tmp_path: Path) -> None:
+    store = Store(tmp_path / "cache")
+    recipe = Recipe("images", {"pipeline.sources": "1f"}, {}, {}, {})
+    with store.begin(recipe, {"product": "images", "scene": "Teddy"}) as draft:
+        draft.create_array("left", (1,), "int8", (1,), ("n",), {})
+        entry = draft.publish(0.0, {"versions": {"semidense-stereo": "0.1.0"}})
+    rows = json.loads(invoke("cache", "ls", "--json", "--cache", store.root).out)["entries"]
+    assert [row["settings"] for row in rows] == ["of version 0.1.0"]
+    items = json.loads(invoke("cache", "gc", "--yes", "--json", "--cache", store.root).out)["items"]
+    told = [(item["name"], item["reason"], item["deleted"]) for item in items]
+    assert told == [(entry.key, "made by version 0.1.0, whose code is gone", True)]
+    assert store.find(entry.key) is None
