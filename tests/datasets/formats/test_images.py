@@ -236,7 +236,7 @@ def jpeg_of_two(path: Path, kind: bytes) -> Path:
     first.save(path, "MPO", save_all=True, append_images=[second])
     content = path.read_bytes()
     primary = b"\0\0\3\0"  # the first of the 16-byte entries: the primary image
-    place = content.index(primary, content.index(b"MPF\0")) + 16
+    place = content.index(primary, content.index(b"MPF\0") + 20) + 16
     path.write_bytes(content[:place] + kind + content[place + 4 :])
     return path
 
