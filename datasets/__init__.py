@@ -22,7 +22,7 @@ if TYPE_CHECKING:
         SceneNotFound,
         UnknownDatasetError,
     )
-    from semidense.datasets.formats.calib import CalibrationFile, read_calib
+    from semidense.datasets.formats.calibration.middlebury import CalibrationFile, read_calib
     from semidense.datasets.formats.images import image_size, read_image
     from semidense.datasets.formats.limits import MAX_PIXELS
     from semidense.datasets.formats.pfm import read_pfm, write_pfm
@@ -83,7 +83,7 @@ _MODULES = (
     "occlusion",
     "formats.pfm",
     "formats.png16",
-    "formats.calib",
+    "formats.calibration.middlebury",
     "formats.images",
     "formats.limits",
 )

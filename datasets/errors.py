@@ -2,7 +2,13 @@
 
 
 class DatasetError(ValueError):
-    """Report anything wrong with what a user gave as a data set; the base of the family."""
+    r"""Report anything wrong with what a user gave as a data set; the base of the family.
+
+    The message is one line: a line break in it, as the name of a file may have, is written as ``\n``.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__("\\n".join(message.splitlines()))
 
 
 class MissingFileError(DatasetError, FileNotFoundError):

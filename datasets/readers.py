@@ -7,7 +7,7 @@ import numpy as np
 
 from semidense.datasets.arrays import DisparityMap, ImageArray, Mask
 from semidense.datasets.errors import CalibrationError, ImageError
-from semidense.datasets.formats.calib import CalibrationFile, read_calib
+from semidense.datasets.formats.calibration.middlebury import CalibrationFile, read_calib
 from semidense.datasets.formats.images import image_size, read_image
 from semidense.datasets.formats.pfm import read_pfm
 from semidense.datasets.occlusion import left_right_check, warped_truth_mask

@@ -57,24 +57,29 @@ class Calibration:
     """Hold what turns disparity into depth: ``Z = baseline * focal / (d + doffs)``, in millimetres.
 
     Attributes:
-        focal: Focal length in pixels, above 0.
+        focal: Focal length along x in pixels, above 0.
         baseline: Distance between the two cameras in millimetres, above 0.
         doffs: Difference of the principal points' columns, right minus left, in pixels.
         centre: Column and row of the left camera's principal point, in pixels; None if it is not known.
+        focal_y: Focal length along y in pixels, above 0; None if it is that along x.
+        skew: How much further right a point lies for each ``Y / Z``, in pixels: ``x = (focal X + skew Y) / Z + cx``.
     """
 
     focal: float
     baseline: float
     doffs: float
     centre: tuple[float, float] | None = None
+    focal_y: float | None = None
+    skew: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("focal", "baseline"):
+        for name in ("focal", "baseline", "focal_y"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
+            if value is not None and not (math.isfinite(value) and value > 0):
                 raise DatasetError(f"calibration: {name} is {value}; it must be finite and above 0")
-        if not math.isfinite(self.doffs):
-            raise DatasetError(f"calibration: doffs is {self.doffs}; it must be finite")
+        for name in ("doffs", "skew"):
+            if not math.isfinite(getattr(self, name)):
+                raise DatasetError(f"calibration: {name} is {getattr(self, name)}; it must be finite")
         if self.centre is not None and not all(map(math.isfinite, self.centre)):
             raise DatasetError(f"calibration: the principal point is {self.centre}; it must be finite")
 
@@ -181,6 +186,7 @@ class SceneSource:
         calibration: What depth needs, or None.
         open_ends: The ends of ``disparities`` that nobody knows: those hold the widest that the image allows, until
             somebody estimates them.
+        warnings: What looks wrong with the files, a line each.
     """
 
     name: str
@@ -194,6 +200,7 @@ class SceneSource:
     has_truth: bool = False
     calibration: Calibration | None = None
     open_ends: tuple[RangeEnd, ...] = ()
+    warnings: tuple[str, ...] = field(default=(), hash=False)
 
     def load(self) -> Scene:
         """Read images and truth.

@@ -69,4 +69,5 @@ def _source(folder: Path, name: str) -> SceneSource:
         files={**files, **truth},
         has_truth="truth" in truth,
         calibration=calib.calibration,
+        warnings=calib.warnings,
     )

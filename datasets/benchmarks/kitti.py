@@ -41,7 +41,8 @@ def list_scenes(argument: str) -> tuple[SceneSource, ...]:
     """
     root = open_folder(argument, "kitti2015:DIR")
     folder = root if (root / "image_2").is_dir() else root / "training"
-    names = sorted(path.name for path in (folder / "image_2").glob(_FRAMES))
+    # Hidden files, such as those that macOS adds, begin with a dot; the pattern alone would take them.
+    names = sorted(path.name for path in (folder / "image_2").glob(_FRAMES) if not path.name.startswith("."))
     if not names:
         raise LayoutError(
             f"{root}: no KITTI 2015 scene; expected [training/]image_2/{_FRAMES} and image_3; found {contents(root)}"

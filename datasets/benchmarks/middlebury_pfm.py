@@ -47,6 +47,7 @@ def source(folder: Path, name: str) -> SceneSource:
         files={**files, **truth},
         has_truth="truth" in truth,
         calibration=calib.calibration,
+        warnings=calib.warnings,
     )
 
 

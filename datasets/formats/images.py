@@ -19,6 +19,7 @@ from PIL.ImageFile import ImageFile
 
 from semidense.datasets.arrays import ImageArray
 from semidense.datasets.errors import ImageError, MissingFileError
+from semidense.datasets.formats.files import open_file
 from semidense.datasets.formats.limits import check_pixels
 
 # The size is judged by `check_pixels`, in one line; Pillow's warning would be a second one.
@@ -29,6 +30,8 @@ _FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "PPM")
 _DECODER_ERRORS = (OSError, EOFError, SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, struct.error)
 """What Pillow's decoders raise on truncated or garbled files."""
 _ORIENTATION = 0x0112
+_MP_ENTRIES = 0xB002
+"""What a JPEG of several images (MPO) says of each of them."""
 _TRANSPOSED = 5
 """The first EXIF orientation that swaps rows and columns, as all above it do."""
 _STEPS = {1: (1, 1), 2: (1, -1), 3: (-1, -1), 4: (-1, 1), 5: (1, 1), 6: (1, -1), 7: (-1, -1), 8: (-1, 1)}
@@ -79,10 +82,10 @@ def image_size(path: str | os.PathLike[str]) -> tuple[int, int]:
 def _opened(path: Path) -> Iterator[tuple[BinaryIO, ImageFile]]:
     """Open a file and turn whatever goes wrong with it, now or later, into one line."""
     try:
-        with path.open("rb") as file, Image.open(file, formats=_FORMATS) as image:
+        with open_file(path) as file, Image.open(file, formats=_FORMATS) as image:
             check_pixels(path, image.height, image.width, ImageError)
             yield file, image
-    except ImageError:
+    except (ImageError, MissingFileError):
         raise
     except UnidentifiedImageError as error:
         raise ImageError(
@@ -90,8 +93,6 @@ def _opened(path: Path) -> Iterator[tuple[BinaryIO, ImageFile]]:
         ) from error
     except Image.DecompressionBombError as error:
         raise ImageError(f"{path}: far too many pixels; scale the image down") from error
-    except (FileNotFoundError, IsADirectoryError, PermissionError) as error:
-        raise MissingFileError(f"{path}: cannot be read ({error.strerror})") from error
     except _DECODER_ERRORS as error:
         raise ImageError(f"{path}: damaged image ({' '.join(str(error).split())})") from error
 
@@ -107,14 +108,26 @@ def _orientation(image: ImageFile) -> int:
 
 
 def _target_mode(path: Path, image: ImageFile) -> str:
-    if getattr(image, "n_frames", 1) > 1:
-        raise ImageError(f"{path}: holds {getattr(image, 'n_frames', 1)} images; save the one to match by itself")
+    frames = getattr(image, "n_frames", 1)
+    if frames > 1 and not _only_previews(image):
+        raise ImageError(f"{path}: holds {frames} images; save the one to match by itself")
     for tile in image.tile:
         layout, *rest = tile.args if isinstance(tile.args, tuple) else (tile.args,)
         _check_depth(path, image.mode, layout, rest if tile.codec_name.startswith("ppm") else [255])
+    if image.mode == "F":
+        raise ImageError(
+            f"{path}: pixels are F, floats whose range nothing tells; scale both views alike to 0..65535, save 16 bits"
+        )
     if image.mode not in _CONVERSIONS:
         raise ImageError(f"{path}: pixels are {image.mode}; convert the image to gray or RGB")
     return _CONVERSIONS[image.mode]
+
+
+def _only_previews(image: ImageFile) -> bool:
+    """Tell whether the further images of a JPEG are previews or the camera's own extras, not views of the scene."""
+    entries = getattr(image, "mpinfo", {}).get(_MP_ENTRIES, [])
+    kinds = [entry["Attribute"]["MPType"] for entry in entries[1:]]
+    return bool(kinds) and not any(kind.startswith("Multi-Frame") for kind in kinds)
 
 
 def _check_depth(path: Path, mode: str, layout: object, largest: list[object]) -> None:
@@ -146,5 +159,7 @@ def _to_array(path: Path, array: _Pixels) -> ImageArray:
     if array.dtype == np.uint8:
         return array.astype(np.uint8, copy=False)
     if array.min() < 0 or array.max() > np.iinfo(np.uint16).max:
-        raise ImageError(f"{path}: gray values from {array.min()} to {array.max()} do not fit 16 bits")
+        raise ImageError(
+            f"{path}: gray values from {array.min()} to {array.max()} do not fit 16 bits; scale both views alike"
+        )
     return array.astype(np.uint16, copy=False)

@@ -13,8 +13,9 @@ from typing import BinaryIO
 import numpy as np
 
 from semidense.datasets.arrays import DisparityMap
-from semidense.datasets.errors import MissingFileError, PfmError
+from semidense.datasets.errors import PfmError
 from semidense.datasets.formats.atomic import atomic_write
+from semidense.datasets.formats.files import as_missing, open_file
 from semidense.datasets.formats.limits import check_pixels
 
 _LONGEST_LINE = 80
@@ -32,10 +33,10 @@ def read_pfm(path: str | os.PathLike[str]) -> DisparityMap:
     """
     path = Path(path)
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             return _read(file, path)
     except OSError as error:
-        raise MissingFileError(f"{path}: cannot be read ({error.strerror})") from error
+        raise as_missing(path, error) from error
 
 
 def write_pfm(path: str | os.PathLike[str], array: np.ndarray[tuple[int, ...], np.dtype[np.floating]]) -> None:

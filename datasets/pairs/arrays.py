@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from semidense.datasets.arrays import ImageArray
 from semidense.datasets.errors import DatasetError
-from semidense.datasets.formats.cameras import read_cameras
+from semidense.datasets.formats.calibration.reading import read_cameras
 from semidense.datasets.pairs.images import harmonised
-from semidense.datasets.pairs.pair import PairOptions, described
+from semidense.datasets.pairs.options import PairOptions
+from semidense.datasets.pairs.pair import described
 from semidense.datasets.registry import Dataset
 from semidense.datasets.scene import IMAGE_ROLES, DisparityRange, Scene, SceneSource
 
@@ -42,7 +44,8 @@ def array_pair(left: object, right: object, options: PairOptions, name: str = "p
     """Make a data set of one pair of arrays.
 
     Args:
-        left: (y, x) or (y, x, 3) RGB, or with a last axis of 1 or of 4 (alpha, which is dropped); uint8 or uint16.
+        left: (y, x) or (y, x, 3) RGB, or with a last axis of 1 or of 4 (RGB and alpha, which is dropped). Whole numbers
+            from 0 to 65535 in any integer dtype and byte order; see `harmonised` for their range.
         right: The right view, of the same height and width.
         options: What is known beside them.
         name: The scene's name.
@@ -59,16 +62,37 @@ def array_pair(left: object, right: object, options: PairOptions, name: str = "p
 
 
 def _as_image(what: str, given: object) -> ImageArray:
-    array = np.asarray(given)
+    array: NDArray[Any] = np.asarray(given)
     bands = array.shape[2:]
     if bands in ((1,), (4,)):
         array = array[..., 0] if bands == (1,) else array[..., :3]
-    if array.dtype not in (np.uint8, np.uint16) or array.shape[2:] not in ((), (3,)) or array.ndim < 2:
+    if array.dtype.kind not in "ui" or array.shape[2:] not in ((), (3,)) or array.ndim < 2:
         shape = " x ".join(map(str, array.shape)) or "a scalar"
         raise DatasetError(
             f"{what} is {array.dtype}, {shape}; give uint8 or uint16, (rows, columns) or (rows, columns, 3)"
+            f"{_about_floats(array)}"
         )
-    return np.ascontiguousarray(array)
+    return _in_16_bits(what, np.ascontiguousarray(array))
+
+
+def _about_floats(array: NDArray[Any]) -> str:
+    if array.dtype.kind != "f" or array.size == 0:
+        return ""
+    return (
+        f"; the values are {np.nanmin(array):g} to {np.nanmax(array):g}: scale both views alike, such as "
+        "(view * 65535).astype(numpy.uint16) for 0 to 1"
+    )
+
+
+def _in_16_bits(what: str, array: NDArray[Any]) -> ImageArray:
+    """Return integers of any kind as uint8 or uint16 in this machine's byte order, with their values."""
+    if array.dtype == np.uint8:
+        eight: ImageArray = array.astype(np.uint8, copy=False)
+        return eight
+    low, high = (int(array.min()), int(array.max())) if array.size else (0, 0)
+    if low < 0 or high > np.iinfo(np.uint16).max:
+        raise DatasetError(f"{what}: values from {low} to {high} do not fit 16 bits; scale both views alike first")
+    return array.astype(np.uint16)
 
 
 def _digest(view: ImageArray) -> str:

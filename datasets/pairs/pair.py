@@ -1,4 +1,4 @@
-"""Take a user's own rectified pairs: two files, two folders, two patterns, or a list.
+"""Take a user's own rectified pairs: two files, two folders, two patterns, a list, or pictures that hold both views.
 
 ``pair:LEFT,RIGHT[,KEY=VALUE...]`` or ``pair:LIST.csv[,KEY=VALUE...]``; a path with a comma stands in double quotes::
 
@@ -7,57 +7,25 @@
     pair:camera/left,camera/right,calib=calib.txt             two folders, paired by name
     pair:shot*_L.jpg,shot*_R.jpg,calib=l.yaml,calib=r.yaml    two patterns, a ROS calibration
     pair:pairs.csv                                            lines left,right[,calibration]
+    pair:video/,split=side-by-side                            every picture holds both views; or over-under
 
-``calib`` is what `semidense.datasets.formats.cameras` reads, ``unit`` its unit of length (mm, cm, m). A range comes
-from ``d_min`` and ``d_max``, else from a ``calib.txt``; an end that neither gives is left open for an estimate.
+``calib`` is what `semidense.datasets.formats.calibration.reading` reads, ``unit`` its unit of length (mm, cm, m). A
+range comes from ``d_min`` and ``d_max``; its upper end else from a ``calib.txt``. An end that nothing gives is left
+open for an estimate: a calibration does not know whether disparities are negative.
 """
 
-import csv
-import io
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from semidense.datasets.errors import CalibrationError, DatasetError
-from semidense.datasets.formats.cameras import PairCalibration, read_cameras
+from semidense.datasets.errors import DatasetError
+from semidense.datasets.formats.calibration.cameras import PairCalibration
+from semidense.datasets.formats.calibration.reading import read_cameras
 from semidense.datasets.formats.images import image_size
-from semidense.datasets.pairs.pairing import LISTS, Pair, find_pairs, read_list
+from semidense.datasets.pairs.lists import LISTS, read_list
+from semidense.datasets.pairs.options import PATTERN, PairOptions, parse
+from semidense.datasets.pairs.pairing import Pair, find_pairs, image_files, pair_name
 from semidense.datasets.scene import DisparityRange, RangeEnd, SceneSource
-
-_PATTERN = "pair:LEFT,RIGHT or pair:LIST.csv"
-
-
-@dataclass(frozen=True)
-class PairOptions:
-    """Say what is known of pairs beside their images.
-
-    Attributes:
-        calib: Calibration files, one or a left and a right one; they replace those that a list names.
-        unit: Their unit of length.
-        d_min: Smallest disparity to search, pixels.
-        d_max: Largest one.
-    """
-
-    calib: tuple[str, ...] = ()
-    unit: str | None = None
-    d_min: int | None = None
-    d_max: int | None = None
-
-
-def pair_spec(sides: Sequence[str], options: PairOptions) -> str:
-    """Write a specification that `list_scenes` reads back.
-
-    >>> pair_spec(["a.png", "b, c.png"], PairOptions(d_max=63))
-    'pair:a.png,"b, c.png",d_max=63'
-    """
-    named = [("unit", options.unit), ("d_min", options.d_min), ("d_max", options.d_max)]
-    given = [f"calib={name}" for name in options.calib] + [
-        f"{key}={value}" for key, value in named if value is not None
-    ]
-    text = io.StringIO()
-    csv.writer(text, lineterminator="").writerow([*sides, *given])
-    return f"pair:{text.getvalue()}"
 
 
 def list_scenes(argument: str) -> tuple[SceneSource, ...]:
@@ -66,58 +34,59 @@ def list_scenes(argument: str) -> tuple[SceneSource, ...]:
     Raises:
         DatasetError: If it cannot be understood, or a file is missing or not valid.
     """
-    sides, options = _parsed(argument)
-    pairs = _listed(sides)
-    known = {
-        files: read_cameras(files, options.unit) for files in {_calib_files(pair, options) for pair in pairs} if files
-    }
-    return tuple(_source(pair, options, known.get(_calib_files(pair, options))) for pair in pairs)
+    sides, options = parse(argument)
+    pairs = _listed(sides, options)
+    wanted = {_calibration_of(pair, options) for pair in pairs}
+    known = {each: read_cameras(each[0], options.unit, each[1]) for each in wanted if each[0]}
+    return tuple(_source(pair, options, known.get(_calibration_of(pair, options))) for pair in pairs)
 
 
-def _parsed(argument: str) -> tuple[list[str], PairOptions]:
-    sides, given = [], PairOptions()
-    for item in next(csv.reader([argument]), []):
-        key, sign, value = item.partition("=")
-        if not sign or key not in PairOptions.__dataclass_fields__:
-            sides.append(item)
-        else:
-            given = _with(given, key, value)
-    if not all(sides) or len(sides) not in (1, 2):
-        raise DatasetError(f"pair:{argument}: {len(sides)} paths; write {_PATTERN}")
-    return sides, given
-
-
-def _with(options: PairOptions, key: str, value: str) -> PairOptions:
-    if key == "calib":
-        return PairOptions((*options.calib, value), options.unit, options.d_min, options.d_max)
-    try:
-        new = value if key == "unit" else int(value)
-    except ValueError as error:
-        raise DatasetError(f"pair: {key}={value}; expected a whole number of pixels") from error
-    return PairOptions(**{**vars(options), key: new})
-
-
-def _listed(sides: list[str]) -> list[Pair]:
+def _listed(sides: list[str], options: PairOptions) -> list[Pair]:
+    if options.split:
+        if len(sides) != 1:
+            raise DatasetError(f"split={options.split}: one picture holds both views, so give one path, not two")
+        return [Pair(pair_name(path), path, path) for path in image_files(sides[0])]
     if len(sides) == 2:
         return find_pairs(*sides)
     path = Path(sides[0]).expanduser()
     if path.suffix.lower() not in LISTS:
-        raise DatasetError(f"{path}: one path alone must be a list ({', '.join(LISTS)}); write {_PATTERN}")
+        raise DatasetError(
+            f"{path}: one path alone must be a list ({', '.join(LISTS)}), or both views with split=; write {PATTERN}"
+        )
     return read_list(path)
 
 
-def _calib_files(pair: Pair, options: PairOptions) -> tuple[Path, ...]:
-    return tuple(Path(name).expanduser() for name in options.calib) or pair.calib
+def _calibration_of(pair: Pair, options: PairOptions) -> tuple[tuple[Path, ...], str]:
+    """Return the calibration's files, and the folder that may tell which of its cameras they are."""
+    files = tuple(Path(name).expanduser() for name in options.calib) or pair.calib
+    return files, pair.left.absolute().parent.name
 
 
 def _source(pair: Pair, options: PairOptions, known: PairCalibration | None) -> SceneSource:
-    size, other = image_size(pair.left), image_size(pair.right)
+    files = {"left": pair.left, "right": pair.right}
+    source = SceneSource(**described(pair.name, _view_size(pair, options), options, known), files=files)
+    return replace(source, warnings=(*pair.warnings, *source.warnings))
+
+
+def _view_size(pair: Pair, options: PairOptions) -> tuple[int, int]:
+    """Return rows and columns of a view, from the images' headers."""
+    size = image_size(pair.left)
+    if options.split:
+        return _half(pair.left, size, options.split)
+    other = image_size(pair.right)
     if other != size:
         raise DatasetError(
             f"{pair.right}: {other[0]} x {other[1]} pixels, but {pair.left} has {size[0]} x {size[1]}; both must agree"
         )
-    files = {"left": pair.left, "right": pair.right}
-    return SceneSource(**described(pair.name, size, options, known), files=files)
+    return size
+
+
+def _half(path: Path, size: tuple[int, int], split: str) -> tuple[int, int]:
+    axis, what = (1, "columns") if split == "side-by-side" else (0, "rows")
+    if size[axis] % 2:
+        raise DatasetError(f"{path}: {size[axis]} {what} cannot be halved; split={split} needs two views of one size")
+    rows, columns = size
+    return (rows, columns // 2) if axis else (rows // 2, columns)
 
 
 def described(name: str, size: tuple[int, int], options: PairOptions, known: PairCalibration | None) -> dict[str, Any]:
@@ -130,14 +99,10 @@ def described(name: str, size: tuple[int, int], options: PairOptions, known: Pai
         known: What a calibration tells.
 
     Raises:
-        CalibrationError: If the calibration is of another size.
+        CalibrationError: If the calibration is of images of another shape.
         DatasetError: If the range is empty or wider than the image.
     """
-    if known and known.size and known.size != size:
-        raise CalibrationError(
-            f"{name}: the calibration is of {known.size[0]} x {known.size[1]} pixels, the images have "
-            f"{size[0]} x {size[1]}; take the calibration of this resolution"
-        )
+    known = known and known.fitted(name, size)
     disparities, open_ends = _range(size[1], options, known)
     return {
         "name": name,
@@ -146,8 +111,10 @@ def described(name: str, size: tuple[int, int], options: PairOptions, known: Pai
         "size": size,
         "disparities": disparities,
         "reader": "semidense.datasets.pairs.images",
+        "parameters": {"split": options.split} if options.split else {},
         "calibration": known.calibration if known else None,
         "open_ends": open_ends,
+        "warnings": known.warnings if known else (),
     }
 
 
@@ -157,8 +124,9 @@ def _range(
     """Return the range to search, and which of its ends only the image's width bounds."""
     # ETH3D's ``ndisp`` is the image's width: it bounds nothing.
     told = known.ndisp if known and known.ndisp and known.ndisp < width else None
-    low = options.d_min if options.d_min is not None else 0 if told else None
-    high = options.d_max if options.d_max is not None else told - 1 if told else None
+    low, high = options.d_min, options.d_max
+    if high is None and told:
+        high = told - 1
     for key, value in (("d_min", low), ("d_max", high)):
         if value is not None and abs(value) >= width:
             raise DatasetError(f"pair: {key}={value}, but the image is only {width} px wide")

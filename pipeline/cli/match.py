@@ -39,9 +39,14 @@ def match(
     max_disp: Annotated[int | None, typer.Option(help="Largest disparity, px.")] = None,
     calib: Annotated[
         list[str] | None,
-        typer.Option(help="calib.txt, OpenCV's YAML or XML, or twice: ROS's left and right files."),
+        typer.Option(help="Calibration: Middlebury's, OpenCV's, KITTI's, JSON, ...; ROS's left and right file by two."),
     ] = None,
-    unit: Annotated[str | None, typer.Option(help="Unit of length of an OpenCV calibration: mm, cm or m.")] = None,
+    split: Annotated[
+        str | None, typer.Option(help="LEFT holds both views: side-by-side, or over-under (upper: left view).")
+    ] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="Unit of length of a calibration that does not tell it: mm, cm or m.")
+    ] = None,
     threshold: Annotated[
         float | None, typer.Option("--R", help="Least confidence that is kept [default: 0.9].")
     ] = None,
@@ -76,11 +81,11 @@ def match(
 
     Writes disparities, confidence and, with a calibration, depth and points as files.
     """
-    from semidense.datasets.pairs.pair import PairOptions, pair_spec
+    from semidense.datasets.pairs.options import PairOptions, pair_spec
     from semidense.pipeline.api import Task
     from semidense.pipeline.pairs.match import Wishes
 
-    options = PairOptions(tuple(calib or ()), unit, min_disp, max_disp)
+    options = PairOptions(tuple(calib or ()), unit, min_disp, max_disp, split)
     sides = [left] if right is None else [left, right]
     task = Task(pair_spec(sides, options), tuple(scene or ()), tuple(settings or ()), config, False, cache)
     wishes = Wishes(

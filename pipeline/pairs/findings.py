@@ -15,12 +15,14 @@ _LEAST_OFFSET = 1.0
 """A vertical offset below this does no harm: a patch is 11 px high."""
 
 
-def findings(survey: Mapping[str, Array], searched: DisparityRange | None) -> list[str]:
+def findings(survey: Mapping[str, Array], searched: DisparityRange | None, doffs: float = 0.0) -> list[str]:
     """Return a line for each thing that a user should look into; none for a sound pair.
 
     Args:
         survey: the product's arrays.
-        searched: the range of disparities that the user gave; None if it is estimated.
+        searched: the range of disparities that the user gave; None if an end of it is estimated.
+        doffs: column of the right principal point minus that of the left, px: a point at infinity has the disparity
+            ``-doffs``.
     """
     if survey["equal"][0] >= _EQUAL:
         return [f"the two views are the same picture ({100 * survey['equal'][0]:.1f} % of their pixels are equal)"]
@@ -28,19 +30,20 @@ def findings(survey: Mapping[str, Array], searched: DisparityRange | None) -> li
     if matches["y"].size < ENOUGH:
         return [f"only {matches['y'].size} places agree between the views: are they of the same scene, and rectified?"]
     step = float(survey["step"][0])
-    return [*_exchanged(matches["disparity"], step, searched), *_unrectified(matches["vertical"], step)]
+    return [*_exchanged(matches["disparity"], step, searched, doffs), *_unrectified(matches["vertical"], step)]
 
 
-def _exchanged(disparity: Array, step: float, searched: DisparityRange | None) -> Iterator[str]:
+def _exchanged(disparity: Array, step: float, searched: DisparityRange | None, doffs: float) -> Iterator[str]:
     if np.mean(np.abs(disparity) < step) >= _NEARLY_ALL:
         yield "the two views hardly differ: nearly all disparities are 0; are they of one camera at one place?"
         return
-    negative = float(np.mean(disparity <= -step))
+    negative = float(np.mean(disparity + max(0.0, doffs) <= -step))
     wanted = searched is not None and searched.minimum <= np.median(disparity)
     if negative >= _NEARLY_ALL and not wanted:
         yield (
             f"left and right look exchanged: {100 * negative:.0f} % of the disparities are negative, about "
-            f"{np.median(disparity):.0f} px; give the files in the other order"
+            f"{np.median(disparity):.0f} px; give the files in the other order, or, if the cameras are turned towards "
+            "each other, the smallest and the largest disparity to search"
         )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from semidense.datasets import Calibration, Dataset, DisparityRange, SceneSource, open_dataset
 from semidense.datasets.pairs.arrays import array_pair
-from semidense.datasets.pairs.pair import PairOptions, pair_spec
+from semidense.datasets.pairs.options import PairOptions, pair_spec
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import findings
@@ -155,7 +155,9 @@ class Match:
         colours = self.image[np.isfinite(self.depth)]
         if colours.dtype == np.uint16:
             colours = (colours // 257).astype(np.uint8)
-        return geometry.points(self.depth, self.calibration.focal, centre), np.broadcast_to(colours, (len(colours), 3))
+        known = self.calibration
+        placed = geometry.points(self.depth, known.focal, centre, known.focal_y, known.skew)
+        return placed, np.broadcast_to(colours, (len(colours), 3))
 
     @property
     def calibration(self) -> Calibration:
@@ -210,8 +212,10 @@ class Match:
 
     @property
     def warnings(self) -> list[str]:
-        """What looks wrong with the pair: exchanged, unrectified or identical views."""
-        return findings(self.survey, None if self.scene.open_ends else self.disparities)
+        """What looks wrong with the pair: its files, its calibration, or exchanged, unrectified or identical views."""
+        known = self.scene.calibration
+        searched = None if self.scene.open_ends else self.disparities
+        return [*self.scene.warnings, *findings(self.survey, searched, known.doffs if known else 0.0)]
 
     def made(self, product: str) -> Made:
         """Return the result of one of the pair's products.
@@ -250,8 +254,8 @@ def match(
         right: the other view, of the same size.
         d_min: smallest disparity to search, px; None for the calibration's, else an estimate.
         d_max: largest one.
-        calib: a Middlebury ``calib.txt``, an OpenCV file, or a left and a right ROS file.
-        unit: of an OpenCV calibration.
+        calib: a calibration file, or a left and a right one of ROS; ``docs/own-pictures.md`` lists the formats.
+        unit: of a calibration that does not tell it, such as OpenCV's.
         settings: ``section.field=value`` of the configuration.
         cache: the cache's folder.
         watch: told how it goes on.

@@ -62,14 +62,13 @@ class StereoMatcher:
         """Return the disparities of the left view: (y, x) float32, px, NaN where there is none.
 
         Args:
-            left: (y, x) gray or (y, x, 3) blue, green, red; uint8 or uint16.
+            left: (y, x) gray, (y, x, 3) blue, green, red, or (y, x, 4) with alpha, which is dropped; uint8 or uint16.
             right: the other view.
 
         Raises:
             DatasetError: if an array is no image, or the two do not fit together.
         """
-        views = [view[..., ::-1] if np.ndim(view) == 3 else view for view in (left, right)]
-        self._found = match(*views, d_min=self._range[0], d_max=self._range[-1], **self._how)
+        self._found = match(_rgb(left), _rgb(right), d_min=self._range[0], d_max=self._range[-1], **self._how)
         return self._found.disparity
 
     @property
@@ -90,3 +89,8 @@ class StereoMatcher:
     def getNumDisparities(self) -> int:  # noqa: N802
         """Return how many disparities are searched."""
         return len(self._range)
+
+
+def _rgb(view: NDArray[Any]) -> NDArray[Any]:
+    """Return OpenCV's blue, green, red (and alpha) as red, green, blue; anything else as it is."""
+    return view[..., 2::-1] if np.shape(view)[2:] in ((3,), (4,)) else view

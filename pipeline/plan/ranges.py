@@ -61,7 +61,9 @@ def _closed(scene: SceneSource, store: Store, key: str) -> SceneSource:
             "--min-disp 0 --max-disp 127 (match) or pair:...,d_min=0,d_max=127"
         )
     edge, known = scene.size[1] - 1, scene.disparities
-    first = max(-edge, int(low)) if "minimum" in scene.open_ends else known.minimum
+    # What has no texture is not seen by the survey: it may widen a range that is half known, never take 0 out of it.
+    least = int(low) if "maximum" in scene.open_ends else min(0, int(low))
+    first = max(-edge, least) if "minimum" in scene.open_ends else known.minimum
     last = min(edge, int(high)) if "maximum" in scene.open_ends else known.maximum
     if first > last:
         raise UsageError(

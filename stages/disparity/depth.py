@@ -39,16 +39,25 @@ def depth(disparity: NDArray[Any], focal: float, baseline: float, doffs: float =
     return result.astype(np.float32)
 
 
-def points(distance: NDArray[np.float32], focal: float, centre: tuple[float, float]) -> NDArray[np.float32]:
+def points(
+    distance: NDArray[np.float32],
+    focal: float,
+    centre: tuple[float, float],
+    focal_y: float | None = None,
+    skew: float = 0.0,
+) -> NDArray[np.float32]:
     """Return the points in space of the pixels that have a depth, row by row.
 
-    ``X = (x - cx) Z / f``, ``Y = -(y - cy) Z / f``, and ``-Z``: x to the right, y up, z towards the viewer, as the
-    common viewers of point clouds have it, so that a cloud opens right side up and seen from the camera.
+    ``Y = (y - cy) Z / fy`` and ``X = ((x - cx) Z - skew Y) / fx``, given as ``X``, ``-Y`` and ``-Z``: x to the right,
+    y up, z towards the viewer, as the common viewers of point clouds have it, so that a cloud opens right side up and
+    seen from the camera.
 
     Args:
         distance: (y, x) float32 depth, NaN unknown.
-        focal: px.
+        focal: along x, px.
         centre: column and row of the principal point, px.
+        focal_y: along y, px; None for that along x.
+        skew: of the camera matrix, px.
 
     Returns:
         (point, 3) float32 in the unit of the depth.
@@ -59,5 +68,6 @@ def points(distance: NDArray[np.float32], focal: float, centre: tuple[float, flo
     require_shape("depth", distance, 2)
     rows, columns = np.nonzero(np.isfinite(distance))
     z = distance[rows, columns].astype(np.float64)
-    placed = np.stack([(columns - centre[0]) * z / focal, (centre[1] - rows) * z / focal, -z], axis=1)
+    up = (centre[1] - rows) * z / (focal_y or focal)
+    placed = np.stack([((columns - centre[0]) * z + skew * up) / focal, up, -z], axis=1)
     return (placed + 0.0).astype(np.float32)

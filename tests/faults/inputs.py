@@ -14,7 +14,7 @@ from PIL import Image
 
 from semidense.cache import Store
 from semidense.cache.upkeep.archive import export_entries, import_entries
-from semidense.datasets.formats.calib import read_calib
+from semidense.datasets.formats.calibration.middlebury import read_calib
 from semidense.datasets.formats.images import read_image
 from semidense.datasets.formats.pfm import read_pfm, write_pfm
 from semidense.datasets.formats.png16 import read_png16

@@ -228,3 +228,30 @@ def test_size_needs_the_header_only(tmp_path: Path) -> None:
     path = tmp_path / "image.png"
     path.write_bytes(png(0, 8, 3, 2, b"no pixels at all"))
     assert image_size(path) == (2, 3)
+
+
+def jpeg_of_two(path: Path, kind: bytes) -> Path:
+    """A JPEG that holds two pictures (MPO), the second one of a kind: what a camera says of it, byte by byte."""
+    first, second = (Image.new("RGB", (8, 6), colour) for colour in ((200, 0, 0), (0, 200, 0)))
+    first.save(path, "MPO", save_all=True, append_images=[second])
+    content = path.read_bytes()
+    primary = b"\0\0\3\0"  # the first of the 16-byte entries: the primary image
+    place = content.index(primary, content.index(b"MPF\0") + 20) + 16
+    path.write_bytes(content[:place] + kind + content[place + 4 :])
+    return path
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(b"\0\0\0\0", id="undefined, as gain maps are"), pytest.param(b"\1\0\1\0", id="a thumbnail")],
+)
+def test_a_jpeg_with_a_preview_is_the_picture_that_it_shows(tmp_path: Path, kind: bytes) -> None:
+    path = jpeg_of_two(tmp_path / "a.jpg", kind)
+    assert image_size(path) == (6, 8)
+    assert np.abs(read_image(path).astype(int) - [200, 0, 0]).max() < 4
+
+
+def test_a_3d_cameras_two_views_in_one_jpeg_are_refused(tmp_path: Path) -> None:
+    path = jpeg_of_two(tmp_path / "a.mpo", b"\2\0\2\0")
+    with pytest.raises(ImageError, match="holds 2 images; save the one to match by itself"):
+        read_image(path)

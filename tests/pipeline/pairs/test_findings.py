@@ -44,3 +44,20 @@ def test_what_looks_wrong_is_said_in_one_line(found: dict[str, np.ndarray], expe
 @pytest.mark.parametrize(("low", "warned"), [(-30, False), (0, True)])
 def test_negative_disparities_that_were_asked_for_are_no_surprise(low: int, warned: bool) -> None:
     assert bool(findings(survey(-20), DisparityRange(low, 30))) == warned
+
+
+@pytest.mark.parametrize(
+    ("doffs", "warned"),
+    [
+        pytest.param(0, True, id="cameras that look straight ahead: beyond infinity"),
+        pytest.param(31, False, id="principal points 31 px apart: a point at infinity has -31 px"),
+        pytest.param(5, True, id="5 px apart do not explain -20 px"),
+    ],
+)
+def test_negative_disparities_that_the_calibration_explains_are_no_surprise(doffs: float, warned: bool) -> None:
+    assert bool(findings(survey(-20), None, doffs)) == warned
+
+
+def test_the_way_out_of_negative_disparities_is_not_only_to_exchange_the_views() -> None:
+    (warning,) = findings(survey(-20), None)
+    assert "if the cameras are turned towards each other, the smallest and the largest disparity" in warning

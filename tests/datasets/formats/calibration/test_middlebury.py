@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from semidense.datasets.errors import CalibrationError, MissingFileError
-from semidense.datasets.formats.calib import read_calib
+from semidense.datasets.formats.calibration.middlebury import read_calib
 from semidense.datasets.scene import Calibration
 
 GOOD = {
@@ -34,6 +34,35 @@ def test_spaces_blank_lines_and_other_names_do_not_matter(tmp_path: Path) -> Non
     path = tmp_path / "calib.txt"
     path.write_text("\n".join(f"  {name} = {value} \r" for name, value in GOOD.items()) + "\n\n isint= 0\nvmin=x\n")
     assert read_calib(path) == read_calib(save(tmp_path, GOOD))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_byte_order_mark_and_comments_do_not_matter(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "calib.txt"
+    lines = "".join(f"{name}={value}  # für {name}\n" for name, value in GOOD.items())
+    path.write_text(f"# Kalibrierung\n{lines}", encoding=encoding)
+    assert read_calib(path) == read_calib(save(tmp_path, GOOD))
+
+
+def test_the_focal_length_along_y_and_skew_are_read(tmp_path: Path) -> None:
+    squeezed = dict.fromkeys(("cam0", "cam1"), "[360 2 112; 0 270 93; 0 0 1]")
+    found = read_calib(save(tmp_path, {**GOOD, **squeezed, "doffs": "0"}))
+    assert found.calibration == Calibration(360, 193.001, 0, (112, 93), focal_y=270, skew=2)
+    assert found.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "numbers"),
+    [
+        pytest.param({"doffs": "35"}, ("35", "31.086"), id="doffs"),
+        pytest.param({"cam1": "[994.978 0 342.279; 0 994.978 256; 0 0 1]"}, ("254.877", "256"), id="rows"),
+    ],
+)
+def test_a_file_that_contradicts_itself_says_so(
+    tmp_path: Path, change: dict[str, str], numbers: tuple[str, str]
+) -> None:
+    (warning,) = read_calib(save(tmp_path, {**GOOD, **change})).warnings
+    assert all(number in warning for number in numbers)
 
 
 @pytest.mark.parametrize("name", [name for name in GOOD if name != "cam1"])
@@ -78,7 +107,7 @@ def test_names_the_line_of_an_invalid_entry(tmp_path: Path, name: str, value: st
         pytest.param(b"=5\n", "expected name=value", id="no name"),
         pytest.param(b"doffs=1\n\ndoffs=2\n", "line 3: doffs is given twice, first in line 1", id="given twice"),
         pytest.param(b"\x89PNG\r\n", "not plain text", id="a PNG"),
-        pytest.param(b"a=1\n" * 20000, "at most 65,536 bytes", id="too long"),
+        pytest.param(b"a=1\n" * 100000, "more than 262,144 bytes", id="too long"),
     ],
 )
 def test_refuses_what_is_no_calib(tmp_path: Path, content: bytes, message: str) -> None:

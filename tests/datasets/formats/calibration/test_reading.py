@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from semidense.datasets import Calibration, CalibrationError, MissingFileError
-from semidense.datasets.formats.cameras import read_cameras
+from semidense.datasets.formats.calibration.reading import read_cameras
 
 EXPECTED = Calibration(500, 120, 30, (311, 250))
 P1 = np.array([[500.0, 0, 311, 0], [0, 500, 250, 0], [0, 0, 1, 0]])
@@ -33,6 +33,31 @@ def test_what_opencv_writes_is_read(tmp_path: Path, ending: str, matrices: dict[
     assert (known.focal, known.centre) == (500, (311, 250))
     assert np.allclose([known.baseline, known.doffs], [120, 30], rtol=1e-9)
     assert (found.size, found.ndisp) == (None, None)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_byte_order_mark_does_not_matter(tmp_path: Path, encoding: str) -> None:
+    path = opencv(tmp_path / "c.yml", P1=P1, P2=P2)
+    path.write_text(path.read_text(), encoding=encoding)
+    assert read_cameras([path], "m").calibration == EXPECTED
+
+
+@pytest.mark.parametrize(
+    ("ending", "mark", "size"),
+    [
+        pytest.param("yml", "---\n", "image_width: 640\nimage_height: 480\n", id="two lines"),
+        pytest.param("yml", "---\n", "imageSize: [ 640, 480 ]\n", id="a cv::Size"),
+        pytest.param(
+            "xml", "<opencv_storage>\n", "<image_width>640</image_width><image_height>480</image_height>", id="XML"
+        ),
+        pytest.param("xml", "<opencv_storage>\n", "<imageSize>\n  640 480</imageSize>", id="a cv::Size in XML"),
+    ],
+)
+def test_the_size_in_an_opencv_file_is_read(tmp_path: Path, ending: str, mark: str, size: str) -> None:
+    path = opencv(tmp_path / f"c.{ending}", P1=P1, P2=P2)
+    assert mark in path.read_text()
+    path.write_text(path.read_text().replace(mark, mark + size, 1))
+    assert read_cameras([path], "m").size == (480, 640)
 
 
 def test_q_is_the_same_as_what_opencv_reprojects_with(tmp_path: Path) -> None:
@@ -89,7 +114,7 @@ def test_cameras_that_are_no_rectified_pair_are_refused(
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        pytest.param(b"", "no line cam0", id="empty"),
+        pytest.param(b"", "no known calibration format.*Middlebury.*OpenCV.*ROS.*KITTI.*K.txt.*JSON", id="empty"),
         pytest.param(b"%YAML:1.0\n---\nK: 3\n", "neither P1 and P2 nor Q", id="another calibration"),
         pytest.param(b"%YAML:1.0\n---\nP1: [1, 2]\nP2: [1]\n", "P1 is no matrix", id="too small"),
         pytest.param(b"%YAML:1.0\n---\n- 1\n", "no names and values", id="a sequence"),
@@ -97,7 +122,7 @@ def test_cameras_that_are_no_rectified_pair_are_refused(
         pytest.param(b"%YAML:1.0\nP1: !!python/object/apply:os.getcwd []\n", "no valid YAML", id="a payload"),
         pytest.param(b"<?xml version='1.0'?><opencv_storage><Q>", "damaged XML", id="truncated XML"),
         pytest.param(b"<?xml version='1.0'?><opencv_storage/>", "neither P1", id="empty XML"),
-        pytest.param(b"\x89PNG\xff\xfe", "no plain text", id="a picture"),
+        pytest.param(b"\x89PNG\xff\xfe", "not plain text", id="a picture"),
         pytest.param(b"#" * (1 << 19), "no calibration", id="too large"),
     ],
 )

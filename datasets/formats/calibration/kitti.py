@@ -1,0 +1,94 @@
+"""Read the calibration files of KITTI and of the Karlsruhe sequences: lines ``name: numbers``, in metres.
+
+| lines | file | cameras |
+|---|---|---|
+| ``P1_roi`` and ``P2_roi``, ``roi`` | Karlsruhe's ``calib.txt`` | left, right, of the cropped images |
+| ``P_rect_00`` to ``P_rect_03``, ``S_rect_00`` ... | the raw data's ``calib_cam_to_cam.txt`` | gray 0, 1; colour 2, 3 |
+| ``P0`` to ``P3`` | the stereo, object and odometry benchmarks | gray 0, 1; colour 2, 3 |
+| ``P1`` and ``P2`` | Karlsruhe's without ``roi`` | left, right |
+
+Every ``P`` is a 3 x 4 projection matrix, row by row. The left camera's last column counts: that of KITTI's colour
+camera is not 0. Source: https://www.cvlibs.net/datasets/kitti/setup.php
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from semidense.datasets.errors import CalibrationError
+from semidense.datasets.formats.calibration.cameras import Cameras
+from semidense.datasets.formats.calibration.text import Matrix, matrix
+
+_LINE = re.compile(r"^(\w+):((?:[ \t]+[-+.\deE]+)+)[ \t]*$", re.MULTILINE)
+_SYSTEMS = (("P1_roi", "P2_roi"), ("P_rect_02", "P_rect_03"), ("P_rect_00", "P_rect_01"), ("P2", "P3"), ("P0", "P1"))
+_FOLDER = re.compile(r"image_0?([0-3])")
+_WANTED = "expected P2 and P3, P0 and P1, P_rect_02 and P_rect_03, or P1_roi and P2_roi"
+
+
+def is_kitti(text: str) -> bool:
+    """Tell whether a text has a projection matrix as KITTI writes it."""
+    return re.search(r"^P(_rect_0)?\d(_roi)?:[ \t]+[-+.\d]", text, re.MULTILINE) is not None
+
+
+def kitti_cameras(path: Path, text: str, folder: str | None = None) -> Cameras:
+    """Return what a file says of a pair.
+
+    Args:
+        path: The file, for messages.
+        text: Its content.
+        folder: Name of the left view's folder: ``image_0`` and ``image_00`` mean the gray cameras, ``image_2`` and
+            ``image_02`` the colour ones. Elsewhere the colour cameras are taken, and a warning gives both baselines.
+
+    Raises:
+        CalibrationError: If there are no two cameras that belong together.
+    """
+    lines = {name: numbers.split() for name, numbers in _LINE.findall(text)}
+    pairs = [pair for pair in (*_SYSTEMS, ("P1", "P2")) if set(pair) <= lines.keys()]
+    if not pairs:
+        raise CalibrationError(f"{path}: no two cameras; {_WANTED}")
+    chosen = _chosen(pairs, folder)
+    left, right = (matrix(path, name, lines[name], (3, 4)) for name in chosen)
+    return Cameras(path, left, right, "m", _size(path, lines, chosen[0]), warnings=_unsure(path, lines, pairs, folder))
+
+
+def _chosen(pairs: list[tuple[str, str]], folder: str | None) -> tuple[str, str]:
+    """Return the pair whose left camera has the number of the folder, else the first one."""
+    number = _FOLDER.fullmatch(folder or "")
+    same = [pair for pair in pairs if number and pair[0] in (f"P{number[1]}", f"P_rect_0{number[1]}")]
+    return (same or pairs)[0]
+
+
+def _unsure(
+    path: Path, lines: Mapping[str, list[str]], pairs: list[tuple[str, str]], folder: str | None
+) -> tuple[str, ...]:
+    rivals = [pair for pair in pairs if pair[0][-1] in "02"]
+    if len(rivals) < 2 or "P1_roi" in lines or _FOLDER.fullmatch(folder or ""):
+        return ()
+    one, other = (_baseline(path, lines, pair) for pair in rivals[:2])
+    return (
+        f"{path}: the file has gray and colour cameras; the colour ones are taken, with a baseline of {one:.5g} m "
+        f"(gray: {other:.5g} m); images in a folder image_0 are of the gray ones",
+    )
+
+
+def _baseline(path: Path, lines: Mapping[str, list[str]], pair: tuple[str, str]) -> float:
+    left, right = (matrix(path, name, lines[name], (3, 4)) for name in pair)
+    return float((left[0, 3] - right[0, 3]) / left[0, 0])
+
+
+def _size(path: Path, lines: Mapping[str, list[str]], left: str) -> tuple[int, int] | None:
+    """Return rows and columns: ``S_rect`` holds columns and rows, ``roi`` the first and last column and row."""
+    if left == "P1_roi" and "roi" in lines:
+        first_x, last_x, first_y, last_y = _whole(matrix(path, "roi", lines["roi"], (1, 4)))
+        return last_y - first_y + 1, last_x - first_x + 1
+    name = left.replace("P_rect", "S_rect")
+    if name == left or name not in lines:
+        return None
+    columns, rows = _whole(matrix(path, name, lines[name], (1, 2)))
+    return rows, columns
+
+
+def _whole(values: Matrix) -> list[int]:
+    return [int(value) for value in np.rint(values.ravel())]

@@ -1,0 +1,56 @@
+"""Read YAML, JSON and OpenCV's XML as names and values."""
+
+import json
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from semidense.datasets.errors import CalibrationError
+
+
+def yaml_values(path: Path, text: str) -> dict[str, Any]:
+    """Read the first document of a YAML text: ``ros2 topic echo`` ends each with ``---``; OpenCV tags its matrices.
+
+    Raises:
+        CalibrationError: If it is not valid, or holds no names.
+    """
+    import yaml  # Dask brings it
+
+    try:
+        documents = yaml.safe_load_all(_plain_yaml(text))
+        return _named(path, next((found for found in documents if found is not None), None))
+    except (yaml.YAMLError, RecursionError) as error:
+        raise CalibrationError(f"{path}: no valid YAML ({_line(error)})") from error
+
+
+def json_values(path: Path, text: str) -> dict[str, Any]:
+    """Read a JSON text; raises `CalibrationError` if it is not valid, or holds no names."""
+    try:
+        return _named(path, json.loads(text))
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise CalibrationError(f"{path}: no valid JSON ({_line(error)})") from error
+
+
+def xml_values(path: Path, text: str) -> dict[str, Any]:
+    """Read an OpenCV XML text, each value as a list of words; raises `CalibrationError` if it is not valid."""
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError) as error:
+        raise CalibrationError(f"{path}: damaged XML ({_line(error)})") from error
+    return {element.tag: (element.findtext("data") or element.text or "").split() for element in root}
+
+
+def _plain_yaml(text: str) -> str:
+    """Drop the directive that OpenCV writes and YAML does not know, and its tag."""
+    first, _, rest = text.lstrip().partition("\n")
+    return (rest if first.startswith("%YAML") else text).replace("!!opencv-matrix", "")
+
+
+def _named(path: Path, found: object) -> dict[str, Any]:
+    if not isinstance(found, dict):
+        raise CalibrationError(f"{path}: no names and values; expected a calibration")
+    return {str(name): value for name, value in found.items()}
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:120]

@@ -1,0 +1,121 @@
+"""Read a calibration from named values: OpenCV's ``P1`` and ``P2``, or ``Q``, or a camera matrix and a baseline.
+
+OpenCV's ``FileStorage`` (YAML, XML, JSON) holds them, and JSON that people write themselves::
+
+    {"P1": [[...], ...], "P2": [[...], ...], "image_width": 640, "image_height": 480, "unit": "mm"}
+    {"K": [[600, 0, 320], [0, 600, 240], [0, 0, 1]], "baseline": 0.12, "unit": "m"}
+    {"fx": 600, "fy": 600, "cx": 320, "cy": 240, "baseline": 120, "unit": "mm"}
+    {"left": {"fx": ...}, "right": {"fx": ...}, "baseline": 120, "unit": "mm"}
+
+Upper and lower case are the same. ``imageSize`` is columns and rows, as ``cv::Size`` is. The unit of OpenCV's files is
+that of the calibration board's squares, which they do not tell.
+
+``Q`` reprojects ``[x y d 1]``: up to a factor it holds 1, ``cx``, ``cy``, ``f``, ``1/baseline`` and ``doffs/baseline``.
+Source: OpenCV's ``stereoRectify`` and ``reprojectImageTo3D``.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from semidense.datasets.errors import CalibrationError
+from semidense.datasets.formats.calibration.cameras import MILLIMETRES, VERTICAL, Cameras
+from semidense.datasets.formats.calibration.text import Matrix, matrix
+
+_CAMERA = ("k", "camera_matrix", "cameramatrix", "intrinsics")
+_SIDES = (("left", "right"), ("cam0", "cam1"), ("left_camera", "right_camera"))
+_WIDTH, _HEIGHT, _BOTH = ("image_width", "width"), ("image_height", "height"), ("imagesize", "image_size")
+_OF_Q = ((0, 0), (1, 1), (0, 3), (1, 3), (2, 3), (3, 2), (3, 3))
+"""Entries of Q that may differ from 0."""
+
+
+def matrices_cameras(path: Path, found: Mapping[str, Any]) -> Cameras:
+    """Return what named values say.
+
+    Raises:
+        CalibrationError: If a matrix is not valid, or what depth needs is not there.
+    """
+    values = _lower(found)
+    left, right = _projections(path, values)
+    unit = str(values.get("unit", values.get("units", "")))
+    return Cameras(path, left, right, unit if unit in MILLIMETRES else None, _size(path, values))
+
+
+def _lower(found: Mapping[str, Any]) -> dict[str, Any]:
+    return {str(name).lower(): value for name, value in found.items()}
+
+
+def _projections(path: Path, values: Mapping[str, Any]) -> tuple[Matrix, Matrix]:
+    if {"p1", "p2"} <= values.keys():
+        return _matrix(path, values, "p1", (3, 4)), _matrix(path, values, "p2", (3, 4))
+    if "q" in values:
+        return _from_q(path, _matrix(path, values, "q", (4, 4)))
+    if "baseline" in values:
+        return _from_baseline(path, values)
+    raise CalibrationError(
+        f"{path}: neither P1 and P2 nor Q, nor a camera matrix and a baseline; save what cv2.stereoRectify gives"
+    )
+
+
+def _from_q(path: Path, given: Matrix) -> tuple[Matrix, Matrix]:
+    """Return the projections that reproject like Q; it may turn y and Z round, as that of OpenCV's sample does."""
+    others = given.copy()
+    others[tuple(zip(*_OF_Q, strict=True))] = 0
+    q = given / (given[0, 0] or 1)
+    if q[3, 2] == 0 or not np.allclose(others[3], 0):
+        raise CalibrationError(f"{path}: Q has no baseline; {VERTICAL}")
+    if not np.allclose(others, 0) or given[0, 0] == 0 or q[2, 3] * q[1, 1] <= 0:
+        raise CalibrationError(f"{path}: Q is not what cv2.stereoRectify gives; give P1 and P2")
+    focal, baseline = abs(q[2, 3]), 1 / q[3, 2]
+    shared = np.array([[focal, 0, -q[0, 3]], [0, q[2, 3] / q[1, 1], -q[1, 3] / q[1, 1]], [0, 0, 1]])
+    return _moved(shared, shared, baseline, q[3, 3] * baseline)
+
+
+def _from_baseline(path: Path, values: Mapping[str, Any]) -> tuple[Matrix, Matrix]:
+    sides = next((pair for pair in _SIDES if all(isinstance(values.get(name), dict) for name in pair)), None)
+    views = [_lower(values[name]) for name in sides] if sides else [values, values]
+    left, right = (_intrinsics(path, view) for view in views)
+    doffs = _number(path, values, "doffs") if "doffs" in values else 0.0
+    return _moved(left, right, _number(path, values, "baseline"), doffs)
+
+
+def _moved(left: Matrix, right: Matrix, baseline: float, doffs: float) -> tuple[Matrix, Matrix]:
+    """Return projections of two cameras side by side; the right one's ``cx`` is moved by ``doffs``."""
+    last = np.array([-left[0, 0] * baseline, 0, 0])
+    moved = right + np.array([[0, 0, doffs], [0, 0, 0], [0, 0, 0]])
+    return np.column_stack([left, np.zeros(3)]), np.column_stack([moved, last])
+
+
+def _intrinsics(path: Path, values: Mapping[str, Any]) -> Matrix:
+    name = next((name for name in _CAMERA if name in values and "fx" not in values), None)
+    if name:
+        return _matrix(path, values, name, (3, 3))
+    fx, cx, cy = (_number(path, values, key) for key in ("fx", "cx", "cy"))
+    fy = _number(path, values, "fy") if "fy" in values else fx
+    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+
+
+def _matrix(path: Path, values: Mapping[str, Any], name: str, shape: tuple[int, int]) -> Matrix:
+    return matrix(path, name.upper(), _numbers(values[name]), shape)
+
+
+def _numbers(value: object) -> object:
+    """Return the numbers of a matrix as OpenCV writes it, anything else as it is."""
+    return value.get("data") if isinstance(value, dict) else value
+
+
+def _number(path: Path, values: Mapping[str, Any], name: str) -> float:
+    if name not in values:
+        raise CalibrationError(f"{path}: no {name}; expected fx, fy, cx and cy or a camera matrix, and baseline")
+    return float(matrix(path, name, values[name], (1, 1))[0, 0])
+
+
+def _size(path: Path, values: Mapping[str, Any]) -> tuple[int, int] | None:
+    both = next((_numbers(values[name]) for name in _BOTH if name in values), None)
+    columns, rows = (next((values[name] for name in names if name in values), None) for names in (_WIDTH, _HEIGHT))
+    if both is None and (columns is None or rows is None):
+        return None
+    found = matrix(path, "the image's size", [columns, rows] if both is None else both, (1, 2))[0]
+    return int(found[1]), int(found[0])

@@ -1,0 +1,98 @@
+"""Say what is known of pairs beside their images, and write it into a specification that is read back."""
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeAlias
+
+from semidense.datasets.errors import DatasetError
+
+SPLITS = ("side-by-side", "over-under")
+"""How one picture may hold both views: left and right halves, or upper (left view) and lower (right view)."""
+PATTERN = "pair:LEFT,RIGHT or pair:LIST.csv or pair:FILE,split=side-by-side"
+_LINE_END = "\r\n"
+_Specification: TypeAlias = tuple[list[str], "PairOptions"]
+
+
+@dataclass(frozen=True)
+class PairOptions:
+    """Say what is known of pairs beside their images.
+
+    Attributes:
+        calib: Calibration files, one or a left and a right one; they replace those that a list names.
+        unit: Their unit of length.
+        d_min: Smallest disparity to search, pixels.
+        d_max: Largest one.
+        split: How one picture holds both views: one of `SPLITS`; None if each view has its own file.
+
+    Raises:
+        DatasetError: If ``split`` is not known.
+    """
+
+    calib: tuple[str, ...] = ()
+    unit: str | None = None
+    d_min: int | None = None
+    d_max: int | None = None
+    split: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.split is not None and self.split not in SPLITS:
+            raise DatasetError(f"split={self.split}: not known; give {' or '.join(SPLITS)}")
+
+
+_KEYS = tuple(field.name for field in fields(PairOptions))
+
+
+def pair_spec(sides: Sequence[str], options: PairOptions) -> str:
+    """Write a specification that `parse` reads back, whatever the names of the files are.
+
+    >>> pair_spec(["a.png", "b, c.png"], PairOptions(d_max=63))
+    'pair:a.png,"b, c.png",d_max=63'
+    >>> pair_spec(["calib=1.png", "b.png"], PairOptions())
+    'pair:./calib=1.png,b.png'
+    """
+    named = [(key, getattr(options, key)) for key in _KEYS if key != "calib"]
+    given = [f"calib={name}" for name in options.calib]
+    given += [f"{key}={value}" for key, value in named if value is not None]
+    text = io.StringIO()
+    # A field is put in quotes if it holds a character of the line's end: so a name may have a line break.
+    csv.writer(text, lineterminator=_LINE_END).writerow([*map(_as_path, sides), *given])
+    return "pair:" + text.getvalue().removesuffix(_LINE_END)
+
+
+def parse(argument: str) -> _Specification:
+    """Read the paths and the options of the text after ``pair:``.
+
+    Raises:
+        DatasetError: If it cannot be understood.
+    """
+    sides, options = [], PairOptions()
+    for item in next(csv.reader(io.StringIO(argument, newline="")), []):
+        key, sign, value = item.partition("=")
+        if sign and key in _KEYS:
+            options = _with(options, key, value)
+        else:
+            sides.append(item)
+    if not all(sides) or len(sides) not in (1, 2):
+        raise DatasetError(f"pair:{argument}: {len(sides)} paths; write {PATTERN}")
+    return sides, options
+
+
+def _as_path(side: str) -> str:
+    """Put ``./`` before a path that would read as an option."""
+    return f"./{side}" if side.partition("=")[0] in _KEYS and "=" in side else side
+
+
+def _with(options: PairOptions, key: str, value: str) -> PairOptions:
+    if key == "calib":
+        return replace(options, calib=(*options.calib, value))
+    changed: dict[str, Any] = {key: _whole(key, value) if key in ("d_min", "d_max") else value}
+    return replace(options, **changed)
+
+
+def _whole(key: str, value: str) -> int:
+    try:
+        return int(value)
+    except ValueError as error:
+        raise DatasetError(f"pair: {key}={value}; expected a whole number of pixels") from error

@@ -1,0 +1,71 @@
+"""KITTI's published numbers, in the layouts of its benchmarks."""
+
+from pathlib import Path
+
+import pytest
+
+from semidense.datasets import CalibrationError, open_dataset
+from semidense.datasets.formats.calibration.cameras import PairCalibration
+from semidense.datasets.formats.calibration.reading import read_cameras
+
+P = {
+    0: "7.215377e+02 0 6.095593e+02 0 0 7.215377e+02 1.728540e+02 0 0 0 1 0",
+    1: "7.215377e+02 0 6.095593e+02 -3.875744e+02 0 7.215377e+02 1.728540e+02 0 0 0 1 0",
+    2: "7.215377e+02 0 6.095593e+02 4.485728e+01 0 7.215377e+02 1.728540e+02 2.163791e-01 0 0 1 2.745884e-03",
+    3: "7.215377e+02 0 6.095593e+02 -3.395242e+02 0 7.215377e+02 1.728540e+02 2.199936e+00 0 0 1 2.729905e-03",
+}
+GRAY = 1000 * 387.5744 / 721.5377
+COLOUR = 1000 * (44.85728 + 339.5242) / 721.5377
+BENCHMARK = "".join(f"P{number}: {row}\n" for number, row in P.items()) + "R0_rect: 1 0 0 0 1 0 0 0 1\n"
+RAW = "calib_time: 09-Jan-2012 13:57:47\ncorner_dist: 9.950000e-02\n" + "".join(
+    f"S_0{number}: 1.392000e+03 5.120000e+02\nS_rect_0{number}: 1.242000e+03 3.750000e+02\nP_rect_0{number}: {row}\n"
+    for number, row in P.items()
+)
+
+
+def read(folder: Path, text: str, of: str | None = None) -> PairCalibration:
+    (folder / "c.txt").write_text(text)
+    return read_cameras([folder / "c.txt"], folder=of)
+
+
+@pytest.mark.parametrize("text", [BENCHMARK, RAW], ids=["benchmark", "raw"])
+@pytest.mark.parametrize(
+    ("folder", "baseline", "warned"),
+    [("image_0", GRAY, 0), ("image_2", COLOUR, 0), ("image_02", COLOUR, 0), ("photos", COLOUR, 1)],
+)
+def test_the_cameras_are_those_of_the_folder(
+    tmp_path: Path, text: str, folder: str, baseline: float, warned: int
+) -> None:
+    found = read(tmp_path, text, folder)
+    assert found.calibration.baseline == pytest.approx(baseline, rel=1e-6)
+    assert (found.calibration.focal, found.calibration.doffs) == (721.5377, 0)
+    assert found.size == ((375, 1242) if text == RAW else None)
+    assert len(found.warnings) == warned
+    assert all("0.53273" in warning and "0.53715" in warning for warning in found.warnings)
+
+
+def test_two_cameras_are_enough(tmp_path: Path) -> None:
+    assert read(tmp_path, f"P2: {P[2]}\nP3: {P[3]}\n").calibration.baseline == pytest.approx(COLOUR, rel=1e-6)
+    assert read(tmp_path, f"P1: {P[0]}\nP2: {P[1]}\n").calibration.baseline == pytest.approx(GRAY, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        pytest.param(f"P2: {P[2]}\n", "no two cameras; expected P2 and P3", id="one camera"),
+        pytest.param(f"P2: {P[2]}\nP3: 1 2 3\n", "P3 is no matrix of 3 x 4", id="cut off"),
+    ],
+)
+def test_a_bad_file_is_one_line(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(CalibrationError, match=message):
+        read(tmp_path, text)
+
+
+def test_the_street_of_karlsruhe(stereo_data: Path) -> None:
+    folder = stereo_data / "own" / "karlsruhe_2010_03_09_drive_0023_000060"
+    (scene,) = open_dataset(f"pair:{folder}/left.png,{folder}/right.png,calib={folder}/calib.txt").scenes
+    known = scene.calibration
+    assert known is not None
+    assert (known.focal, known.doffs, known.centre) == (645.2401, 0, (635.9587, 194.1291))
+    assert known.baseline == pytest.approx(1000 * 368.2632 / 645.2401)
+    assert (scene.size, scene.warnings) == ((372, 1344), ())

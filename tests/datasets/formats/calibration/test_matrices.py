@@ -1,0 +1,116 @@
+"""OpenCV's files and JSON: f 500 px, baseline 120 mm, centres 311 and 341."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from semidense.datasets import Calibration, CalibrationError
+from semidense.datasets.formats.calibration.reading import read_cameras
+from semidense.stages.disparity import depth as geometry
+
+P1 = [[500.0, 0, 311, 0], [0, 500, 250, 0], [0, 0, 1, 0]]
+P2 = [[500.0, 0, 341, -60], [0, 500, 250, 0], [0, 0, 1, 0]]
+SIMPLE = {"fx": 500, "fy": 500, "cx": 311, "cy": 250, "baseline": 0.12}
+LEFT = {"fx": 500, "fy": 500, "cx": 311, "cy": 250}
+
+
+def saved(folder: Path, values: Any) -> Path:  # noqa: ANN401
+    path = folder / "c.json"
+    path.write_text(json.dumps(values))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("values", "doffs", "size"),
+    [
+        pytest.param({"P1": P1, "P2": P2}, 30, None, id="nested rows"),
+        pytest.param({"p1": np.ravel(P1).tolist(), "p2": np.ravel(P2).tolist()}, 30, None, id="flat, small letters"),
+        pytest.param({"P1": P1, "P2": P2, "image_width": 640, "image_height": 480}, 30, (480, 640), id="a size"),
+        pytest.param({"P1": P1, "P2": P2, "imageSize": [640, 480]}, 30, (480, 640), id="a cv::Size"),
+        pytest.param({**SIMPLE, "doffs": 30, "width": 640, "height": 480}, 30, (480, 640), id="numbers"),
+        pytest.param({"K": [[500, 0, 311], [0, 500, 250], [0, 0, 1]], "baseline": 0.12}, 0, None, id="K"),
+        pytest.param({"left": LEFT, "right": {**LEFT, "cx": 341}, "baseline": 0.12}, 30, None, id="two cameras"),
+    ],
+)
+def test_json(tmp_path: Path, values: dict[str, object], doffs: float, size: tuple[int, int] | None) -> None:
+    found = read_cameras([saved(tmp_path, values)], "m")
+    assert replace(found.calibration, baseline=120) == Calibration(500, 120, doffs, (311, 250))
+    assert found.calibration.baseline == pytest.approx(120)
+    assert found.size == size
+    assert read_cameras([saved(tmp_path, {**values, "unit": "m"})]) == found
+
+
+def test_json_of_opencv(tmp_path: Path) -> None:
+    storage = cv2.FileStorage(str(tmp_path / "c.json"), cv2.FILE_STORAGE_WRITE)
+    storage.write("P1", np.array(P1))
+    storage.write("P2", np.array(P2))
+    storage.release()
+    assert read_cameras([tmp_path / "c.json"], "m").calibration == Calibration(500, 120, 30, (311, 250))
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        pytest.param({"P1": P1, "P2": P2}, "does not tell its unit of length; give unit", id="no unit"),
+        pytest.param({"baseline": 1, "fx": 2, "unit": "m"}, "no cx; expected fx, fy, cx and cy", id="no centre"),
+        pytest.param({"K": [1, 2], "baseline": 1, "unit": "m"}, "K is no matrix of 3 x 3", id="half a matrix"),
+        pytest.param({**SIMPLE, "fx": "wide", "unit": "m"}, "fx is no matrix of 1 x 1", id="a word"),
+        pytest.param({"R": 1}, "neither P1 and P2 nor Q, nor a camera matrix and a baseline", id="something else"),
+    ],
+)
+def test_bad_json_is_one_line(tmp_path: Path, values: object, message: str) -> None:
+    with pytest.raises(CalibrationError, match=message):
+        read_cameras([saved(tmp_path, values)])
+
+
+def q(*, fy: float = 500, flip: float = 1) -> np.ndarray:
+    return np.array(
+        [[1.0, 0, 0, -311], [0, flip * 500 / fy, 0, -flip * 500 / fy * 250], [0, 0, 0, flip * 500], [0, 0, 25 / 3, 250]]
+    )
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        pytest.param(q(), id="as stereoRectify gives it"),
+        pytest.param(3 * q(), id="three times as much is the same"),
+        pytest.param(q(fy=400), id="another focal length along y"),
+        pytest.param(q(flip=-1), id="y up, as in OpenCV's sample"),
+    ],
+)
+def test_q_places_points_where_opencv_does(tmp_path: Path, matrix: np.ndarray) -> None:
+    disparity = np.linspace(5, 60, 12, dtype=np.float32).reshape(3, 4)
+    expected = cv2.reprojectImageTo3D(disparity, matrix.astype(np.float32)).reshape(-1, 3)
+    known = read_cameras([saved(tmp_path, {"Q": matrix.tolist()})], "m").calibration
+    z = geometry.depth(disparity, known.focal, known.baseline / 1000, known.doffs)
+    placed = geometry.points(z, known.focal, known.centre, known.focal_y)
+    turned = [1, -1, -1] if matrix[2, 3] > 0 else [1, 1, 1]
+    assert np.allclose(placed, expected * turned, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("row", "column"), [(0, 1), (2, 0), (1, 2)])
+def test_a_q_of_another_kind_is_refused(tmp_path: Path, row: int, column: int) -> None:
+    matrix = q()
+    matrix[row, column] = 0.5
+    with pytest.raises(CalibrationError, match=r"Q is not what cv2\.stereoRectify gives; give P1 and P2"):
+        read_cameras([saved(tmp_path, {"Q": matrix.tolist()})], "m")
+
+
+def test_a_real_rectification_gives_the_depth_that_opencv_gives(tmp_path: Path) -> None:
+    """``stereoRectify`` of two turned cameras; its P1 and P2, and its Q, must place points as OpenCV does."""
+    camera = np.array([[420.0, 0, 322], [0, 415, 236], [0, 0, 1]])
+    turn, _ = cv2.Rodrigues(np.array([0.01, -0.02, 0.015]))
+    offset = np.array([[-0.11], [0.004], [0.003]])
+    found = cv2.stereoRectify(camera, np.zeros(5), camera, np.zeros(5), (640, 480), turn, offset, flags=0)
+    first, second, matrix = found[2:5]
+    disparity = np.full((1, 1), 25, np.float32)
+    expected = cv2.reprojectImageTo3D(disparity, matrix.astype(np.float32))[0, 0]
+    for values in ({"P1": first.tolist(), "P2": second.tolist()}, {"Q": matrix.tolist()}):
+        known = read_cameras([saved(tmp_path, values)], "m").calibration
+        z = geometry.depth(disparity, known.focal, known.baseline / 1000, known.doffs)
+        assert np.allclose(geometry.points(z, known.focal, known.centre)[0] * [1, -1, -1], expected, rtol=1e-4)
