@@ -44,7 +44,7 @@ class EvaluationNetParams(Schedule):
 
 
 class ConfidenceParams(Params):
-    """How the evaluation-Net runs, and how much the map's agreement weighs beside it."""
+    """How the evaluation-Net runs, how much the map's agreement weighs beside it, and what vetoes both."""
 
     agreement: float = Field(
         4.0, ge=0, le=100, description="weight of the map's agreement, a power of it; 0 is the paper"
@@ -57,12 +57,22 @@ class ConfidenceParams(Params):
     )
     window: int = Field(25, ge=3, le=PATCH, description="side of the window of the agreement, px, odd")
     flipped: bool = Field(False, description="look upside down too, and take the mean; twice the time")
+    veto: bool = Field(
+        True,
+        description="confidence 0 where the costs have no clear winner, or a view is blank or repeats itself along "
+        "its rows; false is the paper",
+    )
     precision: Precision = Field("auto", description="arithmetic: float32, bfloat16, or what this CPU is fast at")
 
     @field_validator("window")
     @classmethod
     def _odd(cls, window: int) -> int:
         return require_window(window)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The products that these settings need."""
+        return ("images", "disparity", "evaluation_net", *(("distinctiveness", "cost_margin") if self.veto else ()))
 
 
 EVALUATION_SAMPLES = Stage(
@@ -96,9 +106,11 @@ EVALUATION_NET = Stage(
 
 CONFIDENCE = Stage(
     product="confidence",
-    inputs=("images", "disparity", "evaluation_net"),
+    inputs=("images", "disparity", "evaluation_net", "distinctiveness", "cost_margin"),
     outputs=(
-        Output("confidence", ("y", "x"), "float32", "1", "how sure it is that the disparity is right, in [0, 1]"),
+        Output(
+            "confidence", ("y", "x"), "float32", "1", "how sure it is that the disparity is right, in [0, 1]; 0: veto"
+        ),
         Output("network", ("y", "x"), "float32", "1", "probability by the evaluation-Net alone, in [0, 1]"),
         Output("agreement", ("y", "x"), "float32", "1", "share of the window with the same disparity, in (0, 1]"),
     ),
