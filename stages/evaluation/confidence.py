@@ -94,6 +94,6 @@ def compute_confidence(params: ConfidenceParams, inputs: Inputs) -> dict[str, ND
 
 def _vetoed(inputs: Inputs) -> NDArray[np.bool_]:
     """Return where the views or the costs tell no disparity, (y, x)."""
-    distinctiveness: NDArray[np.float32] = inputs["distinctiveness"]["distinctiveness"]
-    silent = repetitive(distinctiveness, inputs["disparity"]["disparity"])
+    views = inputs["distinctiveness"]
+    silent = repetitive(views["left"], views["right"], inputs["disparity"]["disparity"])
     return silent | undecided(inputs["cost_margin"]["margin"])

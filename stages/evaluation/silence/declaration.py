@@ -7,6 +7,8 @@ from semidense.stages.transforms.window import require_window
 
 NEAREST_REPETITION = 4
 """Least shift of a patch that counts as a repetition, px. Smooth shading looks alike 2 or 3 px away."""
+MOST_DISTINCT = 100.0
+"""Distinctiveness beyond which nothing changes, and of pixels near which no patch with a shifted one fits."""
 LARGEST_MARGIN = 40.0
 """Margin of a pixel whose costs have no rival of the winner, log-odds."""
 
@@ -44,19 +46,15 @@ DISTINCTIVENESS = Stage(
     product="distinctiveness",
     inputs=("images",),
     outputs=(
+        Output("left", ("y", "x"), "float32", "1", "left view: difference from what lies beside; below 1: no texture"),
         Output(
-            "distinctiveness",
-            ("view", "y", "x"),
-            "float32",
-            "1",
-            "difference from what lies beside it along the row; below 1 it tells no disparity; views left, right",
+            "right", ("y", "x"), "float32", "1", "right view: difference from what lies beside; below 1: no texture"
         ),
     ),
     compute="semidense.stages.evaluation.silence.distinctiveness:compute_distinctiveness",
     params=DistinctivenessParams,
     tile_rows=256,
     halo=lambda params: params.window - 1 + params.margin,
-    sizes=lambda _: {"view": 2},
 )
 """Where the views themselves cannot tell a disparity, whatever matches them."""
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.evaluation.silence.declaration import NEAREST_REPETITION, DistinctivenessParams
+from semidense.stages.evaluation.silence.declaration import MOST_DISTINCT, NEAREST_REPETITION, DistinctivenessParams
 from semidense.stages.stage import Arrays, Inputs
 from semidense.stages.transforms.gray import require_gray, to_gray
 
@@ -29,8 +29,8 @@ def distinctiveness(gray: NDArray[np.uint8], params: DistinctivenessParams) -> N
         params: the window, the noise and the shifts.
 
     Returns:
-        (y, x) float32, at least 0. Below 1 the pixel has no texture by which its disparity could be found. Infinite
-        where no window with a shifted one fits into the image.
+        (y, x) float32 in [0, 100]. Below 1 the pixel has no texture by which its disparity could be found. 100 where
+        no window with a shifted one fits into the image.
 
     Raises:
         StageError: if ``gray`` is no 8-bit gray image, or the range of disparities is open.
@@ -45,13 +45,13 @@ def distinctiveness(gray: NDArray[np.uint8], params: DistinctivenessParams) -> N
     require_gray(gray)
     window, reach = params.window, params.reach
     if min(gray.shape) < window:
-        return np.full(gray.shape, np.inf, np.float32)
+        return np.full(gray.shape, MOST_DISTINCT, np.float32)
     values = np.ascontiguousarray(gray).astype(np.int32)
     least = np.full([length - window + 1 for length in gray.shape], np.iinfo(np.int32).max, np.int32)
     _least_difference(values, window, reach, least)
     allowed = window**2 * (params.noise + params.share * _deviation(values, window))
-    told = np.where(least < np.iinfo(np.int32).max, least / allowed, np.inf)
-    return _least_of_windows(told.astype(np.float32), window, params.margin)
+    told = np.minimum(least / allowed, MOST_DISTINCT).astype(np.float32)
+    return _least_of_windows(told, window, params.margin)
 
 
 def _deviation(values: NDArray[np.int32], window: int) -> NDArray[np.float64]:
@@ -73,7 +73,7 @@ def _least_of_windows(told: NDArray[np.float32], window: int, margin: int) -> ND
     """Return for each pixel the least value of the windows near it; ``told`` goes by their first pixels."""
     reach = window - 1 + margin
     for _ in range(2):
-        padded = np.pad(told, ((reach, reach), (0, 0)), constant_values=np.inf)
+        padded = np.pad(told, ((reach, reach), (0, 0)), constant_values=MOST_DISTINCT)
         last = len(padded) - reach - margin
         told = np.min([padded[first : last + first] for first in range(reach + margin + 1)], axis=0).T
     return told
@@ -111,4 +111,4 @@ def _write_least(columns: NDArray[np.int32], window: int, shift: int, least: NDA
 def compute_distinctiveness(params: DistinctivenessParams, inputs: Inputs) -> Arrays:
     """Compute the product ``distinctiveness`` of both views; see ``distinctiveness``."""
     images = inputs["images"]
-    return {"distinctiveness": np.stack([distinctiveness(to_gray(images[view]), params) for view in ("left", "right")])}
+    return {view: distinctiveness(to_gray(images[view]), params) for view in ("left", "right")}

@@ -31,12 +31,15 @@ def undecided(margin: NDArray[np.float32]) -> NDArray[np.bool_]:
     return result
 
 
-def repetitive(distinctiveness: NDArray[np.float32], disparity: NDArray[np.float32]) -> NDArray[np.bool_]:
+def repetitive(
+    left: NDArray[np.float32], right: NDArray[np.float32], disparity: NDArray[np.float32]
+) -> NDArray[np.bool_]:
     """Return where a view is not distinctive: the left one at a pixel, or the right one at the pixel it was matched to.
 
     Args:
-        distinctiveness: float32 (view, y + 100, x + 100), with 50 px of context all round.
-        disparity: float32 (y + 100, x + 100), px, with the same context; NaN has no match.
+        left: distinctiveness of the left view, float32 (y + 100, x + 100), with 50 px of context all round.
+        right: that of the right view.
+        disparity: px, NaN for none; of the same type and shape.
 
     Returns:
         (y, x) bool.
@@ -44,8 +47,8 @@ def repetitive(distinctiveness: NDArray[np.float32], disparity: NDArray[np.float
     middle = _middle(disparity)
     rows, columns = np.indices(middle.shape)
     matched = columns + RADIUS - np.rint(np.nan_to_num(middle)).astype(np.intp)
-    right = distinctiveness[1, rows + RADIUS, np.clip(matched, 0, disparity.shape[1] - 1)]
-    result: NDArray[np.bool_] = (_middle(distinctiveness[0]) < 1) | (right < 1)
+    there = right[rows + RADIUS, np.clip(matched, 0, right.shape[1] - 1)]
+    result: NDArray[np.bool_] = (_middle(left) < 1) | (there < 1)
     return result
 
 

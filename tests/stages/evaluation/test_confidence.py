@@ -15,7 +15,7 @@ DIMS = {
     "images": {"left": ("y", "x", "band"), "moments": ("view", "moment")},
     "disparity": {"disparity": ("y", "x")},
     "evaluation_net": {"parameters": ("parameter",)},
-    "distinctiveness": {"distinctiveness": ("view", "y", "x")},
+    "distinctiveness": {"left": ("y", "x"), "right": ("y", "x")},
     "cost_margin": {"margin": ("y", "x")},
 }
 
@@ -26,7 +26,7 @@ def products(height: int = 11, width: int = 8) -> dict[str, dict[str, np.ndarray
         "images": {name: given["images"][name] for name in ("left", "moments")},
         "disparity": given["disparity"],
         "evaluation_net": {"parameters": to_vector(random_net())},
-        "distinctiveness": {"distinctiveness": np.full((2, height, width), 9, np.float32)},
+        "distinctiveness": {view: np.full((height, width), 9, np.float32) for view in ("left", "right")},
         "cost_margin": {"margin": np.full((height, width), 5, np.float32)},
     }
 
@@ -121,7 +121,7 @@ def test_agreement_weighs_in_by_its_power_and_not_at_all_in_the_paper_s_form() -
 def vetoing() -> dict[str, dict[str, np.ndarray]]:
     """Products of which the left view says nothing at (2, 3), the costs nothing at (8, 1)."""
     given = products()
-    given["distinctiveness"]["distinctiveness"][0, 2, 3] = 0.5
+    given["distinctiveness"]["left"][2, 3] = 0.5
     given["cost_margin"]["margin"][8, 1] = 0
     return given
 

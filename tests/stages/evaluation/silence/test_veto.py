@@ -10,8 +10,7 @@ HEIGHT, WIDTH, DEPTH = 20, 24, 40
 
 
 def padded(values: np.ndarray) -> np.ndarray:
-    margins = [(0, 0)] * (values.ndim - 2) + [(50, 50), (50, 50)]
-    return np.pad(values, margins, mode="edge")
+    return np.pad(values, 50, mode="edge")
 
 
 def curves(*winners: int, depth: float = 6, noise: float = 0.0, seed: int = 0) -> np.ndarray:
@@ -47,9 +46,9 @@ def test_one_tie_among_clear_winners_is_undecided_alone() -> None:
 
 
 def test_a_view_without_texture_speaks_for_its_own_pixels_and_the_right_one_for_those_matched_to_it() -> None:
-    distinctiveness = np.full((2, 6, 9), 3, np.float32)
-    distinctiveness[0, 1, 2] = distinctiveness[1, 4, 5] = 0.5
+    left, right = np.full((2, 6, 9), 3, np.float32)
+    left[1, 2] = right[4, 5] = 0.5
     disparity = np.zeros((6, 9), np.float32)
     disparity[4, 7], disparity[4, 5], disparity[4, 3], disparity[4, 8] = 2.4, 1, -2, np.nan
-    found = repetitive(padded(distinctiveness), padded(disparity))
+    found = repetitive(padded(left), padded(right), padded(disparity))
     assert np.argwhere(found).tolist() == [[1, 2], [4, 3], [4, 7]]
