@@ -14,6 +14,7 @@ from semidense.stages.disparity.survey import SURVEY
 from semidense.stages.evaluation.calibration.declaration import CALIBRATED_CONFIDENCE, CALIBRATION
 from semidense.stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
 from semidense.stages.evaluation.filtering import SEMIDENSE
+from semidense.stages.evaluation.silence.declaration import COST_MARGIN, DISTINCTIVENESS
 from semidense.stages.matching.declaration import COST_VOLUME, DESCRIPTOR_NET, MATCHING_NET, MATCHING_SAMPLES
 from semidense.stages.metrics import METRICS
 from semidense.stages.stage import Stage, StageError
@@ -28,6 +29,8 @@ CATALOG: tuple[Stage, ...] = (
     COST_VOLUME,
     DISPARITY,
     RIGHT_DISPARITY,
+    DISTINCTIVENESS,
+    COST_MARGIN,
     EVALUATION_SAMPLES,
     EVALUATION_NET,
     CONFIDENCE,

@@ -58,6 +58,7 @@ _DRAW: Mapping[str, Callable[..., None]] = {
     "metrics": draw_metrics,
     **dict.fromkeys(("sgm", "census", "sncc", "mc_cnn", "mc_cnn_accurate"), draw_disparity),
     **dict.fromkeys(("o1", "ccnn"), draw_confidence),
+    **dict.fromkeys(("distinctiveness", "cost_margin"), draw_any),
     "ccnn_net": draw_network,
 }
 """What draws each product that has a figure."""

@@ -101,7 +101,7 @@ def draw_confidence(figure: Figure, dataset: xr.Dataset) -> None:
 
 
 def draw_any(figure: Figure, dataset: xr.Dataset) -> None:
-    """Draw the maps of a product whose stage is of another package, each on its own scale.
+    """Draw the maps of a product side by side, each on its own scale.
 
     Raises:
         UsageError: if no array has the image's rows and columns.

@@ -1,4 +1,4 @@
-"""The confidence of each pixel of a raw map: the evaluation-Net at every pixel at once, and the map's agreement."""
+"""The confidence of each pixel of a raw map: the evaluation-Net at every pixel, the map's agreement, and the veto."""
 
 import numpy as np
 import torch
@@ -11,6 +11,7 @@ from semidense.stages.evaluation.agreement import padded_agreement
 from semidense.stages.evaluation.declaration import RADIUS, ConfidenceParams
 from semidense.stages.evaluation.layers import evaluation_layers
 from semidense.stages.evaluation.net import EvaluationNet
+from semidense.stages.evaluation.silence.veto import repetitive, undecided
 from semidense.stages.learning.parameters import from_vector
 from semidense.stages.stage import Array, Inputs, require_shape
 
@@ -83,8 +84,16 @@ def compute_confidence(params: ConfidenceParams, inputs: Inputs) -> dict[str, ND
     net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     log_odds = padded_log_odds(net, layers, params.precision, params.flipped)
     agreeing = padded_agreement(disparity, params.window)
+    weighed = weigh_in(log_odds, agreeing, params.agreement, params.typical)
     return {
-        "confidence": weigh_in(log_odds, agreeing, params.agreement, params.typical),
+        "confidence": np.where(_vetoed(inputs), np.float32(0), weighed) if params.veto else weighed,
         "network": sigmoid(log_odds),
         "agreement": agreeing,
     }
+
+
+def _vetoed(inputs: Inputs) -> NDArray[np.bool_]:
+    """Return where the views or the costs tell no disparity, (y, x)."""
+    views = inputs["distinctiveness"]
+    silent = repetitive(views["left"], views["right"], inputs["disparity"]["disparity"])
+    return silent | undecided(inputs["cost_margin"]["margin"])

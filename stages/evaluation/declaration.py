@@ -54,7 +54,7 @@ class EvaluationNetParams(Schedule):
 
 
 class ConfidenceParams(Params):
-    """How the evaluation-Net runs, and how much the map's agreement weighs beside it."""
+    """How the evaluation-Net runs, how much the map's agreement weighs beside it, and what vetoes both."""
 
     agreement: float = Field(
         4.0,
@@ -72,6 +72,11 @@ class ConfidenceParams(Params):
     flipped: bool = Field(
         False, description="also score the image upside down, and take the mean; takes twice the time"
     )
+    veto: bool = Field(
+        True,
+        description="confidence 0 where the costs have no clear winner, or a view is blank or repeats itself along "
+        "its rows; false: no veto, as in the paper",
+    )
     precision: Precision = Field(
         "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
     )
@@ -80,6 +85,11 @@ class ConfidenceParams(Params):
     @classmethod
     def _odd(cls, window: int) -> int:
         return require_window(window)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The products that these settings need."""
+        return ("images", "disparity", "evaluation_net", *(("distinctiveness", "cost_margin") if self.veto else ()))
 
 
 EVALUATION_SAMPLES = Stage(
@@ -113,9 +123,11 @@ EVALUATION_NET = Stage(
 
 CONFIDENCE = Stage(
     product="confidence",
-    inputs=("images", "disparity", "evaluation_net"),
+    inputs=("images", "disparity", "evaluation_net", "distinctiveness", "cost_margin"),
     outputs=(
-        Output("confidence", ("y", "x"), "float32", "1", "how sure it is that the disparity is right, in [0, 1]"),
+        Output(
+            "confidence", ("y", "x"), "float32", "1", "how sure it is that the disparity is right, in [0, 1]; 0: veto"
+        ),
         Output("network", ("y", "x"), "float32", "1", "probability by the evaluation-Net alone, in [0, 1]"),
         Output("agreement", ("y", "x"), "float32", "1", "share of the window with the same disparity, in (0, 1]"),
     ),

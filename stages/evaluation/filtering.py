@@ -76,17 +76,17 @@ def threshold_for(density: float, disparity: NDArray[Any], confidence: NDArray[A
     Args:
         density: the share of all pixels, in (0, 1].
         disparity: (y, x) float, NaN unknown; a pixel without one is never kept.
-        confidence: (y, x) float in [0, 1].
+        confidence: (y, x) float in [0, 1]; a pixel of confidence 0, where nothing was seen, is never kept.
 
     Returns:
         The confidence of the last pixel that is kept. As many pixels as asked for are kept, and those that tie with
-        the last one; fewer only where fewer have a disparity. 1 if none has.
+        the last one; fewer only where fewer have a disparity and a confidence above 0. 1 if none has.
 
     >>> threshold_for(0.5, np.array([[1.0, 2.0, 3.0, np.nan]]), np.array([[0.2, 0.7, 0.9, 0.99]]))
     0.7
     """
     require_share("density", density)
-    scores = confidence[np.isfinite(disparity) & np.isfinite(confidence)]
+    scores = confidence[np.isfinite(disparity) & (confidence > 0)]
     if not scores.size:
         return 1.0
     kept = min(scores.size, max(1, math.ceil(density * disparity.size)))
@@ -102,7 +102,8 @@ def threshold_for_error(max_error: float, disparity: NDArray[Any], probability: 
     Args:
         max_error: share of wrong pixels among the kept, in (0, 1).
         disparity: (y, x) float, NaN unknown; a pixel without one is never kept.
-        probability: (y, x) float in [0, 1], calibrated: that the disparity is right.
+        probability: (y, x) float in [0, 1], calibrated: that the disparity is right; a pixel of probability 0, where
+            nothing was seen, is never kept.
 
     Returns:
         The least probability that is kept; 1 if no pixel is sure enough.
@@ -111,7 +112,7 @@ def threshold_for_error(max_error: float, disparity: NDArray[Any], probability: 
     0.8
     """
     require_share("max_error", max_error)
-    scores = probability[np.isfinite(disparity) & np.isfinite(probability)]
+    scores = probability[np.isfinite(disparity) & (probability > 0)]
     values, counts = np.unique(scores.astype(np.float64), return_counts=True)
     wrong, kept = np.cumsum((counts * (1 - values))[::-1]), np.cumsum(counts[::-1])
     reached = np.flatnonzero(wrong <= max_error * kept)

@@ -129,6 +129,16 @@ def survey() -> xr.Dataset:
     )
 
 
+def distinctiveness() -> xr.Dataset:
+    silent = np.linspace(0, 2, 24, dtype=np.float32).reshape(4, 6)
+    return xr.Dataset({view: (("y", "x"), silent, {"long_name": f"{view} view"}) for view in ("left", "right")})
+
+
+def cost_margin() -> xr.Dataset:
+    margin = np.where(np.isnan(DISPARITY), N, 2).astype(np.float32)
+    return xr.Dataset({"margin": (("y", "x"), margin, {"long_name": "margin", "units": "log-odds"})})
+
+
 PRODUCTS: dict[str, Callable[[], xr.Dataset]] = {
     "images": images,
     "truth": truth,
@@ -141,6 +151,8 @@ PRODUCTS: dict[str, Callable[[], xr.Dataset]] = {
     "disparity": disparity,
     "evaluation_samples": evaluation_samples,
     "evaluation_net": shipped,
+    "distinctiveness": distinctiveness,
+    "cost_margin": cost_margin,
     "confidence": confidence,
     "calibration": calibration,
     "calibrated_confidence": confidence,

@@ -78,6 +78,8 @@ def test_every_product_of_the_pipeline_has_a_figure() -> None:
             ["probability that the disparity is right", "confidence (0 to 1)", "none: 0.0 %"],
             id="zero-to-one",
         ),
+        pytest.param("distinctiveness", ["left view", "right view", "left (1)"], id="both-views-beside-each-other"),
+        pytest.param("cost_margin", ["margin", "margin (log-odds)", "none: 8.3 %"], id="own-scale"),
         pytest.param("semidense", ["disparity (px)", "none: 8.3 %"], id="as-disparity"),
         pytest.param(
             "survey",

@@ -122,7 +122,7 @@ def test_a_damaged_record_is_a_missing_entry(toy_plan: ToyPlan, toy_run: ToyRun,
 
 # What depends on what, with the real stages and a whole run in the cache.
 
-ABOVE_CHANNELS = {"images", "truth", "matching_samples"}
+ABOVE_CHANNELS = {"images", "truth", "matching_samples", "distinctiveness"}
 BELOW_DISPARITY = {"confidence", "semidense", "metrics"}
 ALL = PATH
 
@@ -140,7 +140,7 @@ def test_the_run_s_own_plan_is_all_hits(trained_task: Task) -> None:
     [
         ("channels.rank_window=15", ALL - ABOVE_CHANNELS, "params.rank_window: 31 -> 15"),
         ("channels.gray=raw", ALL - ABOVE_CHANNELS, "params.gray: standardized -> raw"),
-        ("matching_samples.seed=1", ALL - {"images", "truth", "channels"}, "params.seed: 0 -> 1"),
+        ("matching_samples.seed=1", ALL - {"images", "truth", "channels", "distinctiveness"}, "params.seed: 0 -> 1"),
         ("matching_net.steps=3", ALL - ABOVE_CHANNELS - {"channels"}, "params.steps: 2 -> 3"),
         ("costvolume.d_max=7", ALL - ABOVE_CHANNELS - {"channels", "matching_net"}, "params.d_max: 8 -> 7"),
         (

@@ -54,7 +54,8 @@ def test_with_training_the_training_scenes_are_only_learnt_from() -> None:
     made = graph(train=True)
     four = dict.fromkeys(("images", "truth", "channels", "costvolume", "disparity"), 4)
     one = dict.fromkeys(("matching_samples", "matching_net", "evaluation_samples", "evaluation_net"), 1)
-    two = dict.fromkeys(("right_disparity", "confidence", "semidense", "metrics"), 2)
+    scored = ("right_disparity", "distinctiveness", "cost_margin", "confidence", "semidense", "metrics")
+    two = dict.fromkeys(scored, 2)
     assert counts(made) == Counter({**four, **one, **two})
     assert [made.steps[each].scene for each, _ in made.targets] == ["test-0", "test-1"]
     assert [note.split(" ")[0] for note in made.notes] == ["train-0", "train-1"]
@@ -139,7 +140,7 @@ def test_a_sweep_over_the_threshold_shares_all_above() -> None:
 def test_a_sweep_over_a_setting_shares_what_does_not_depend_on_it() -> None:
     made = counts(variants("disparity.subpixel=true", "disparity.subpixel=false"))
     assert {product for product, count in made.items() if count == 1} == {
-        "images", "truth", "channels", "matching_net", "costvolume", "evaluation_net",
+        "images", "truth", "channels", "matching_net", "costvolume", "evaluation_net", "distinctiveness", "cost_margin",
     }  # fmt: skip
 
 

@@ -15,6 +15,8 @@ DIMS = {
     "images": {"left": ("y", "x", "band"), "moments": ("view", "moment")},
     "disparity": {"disparity": ("y", "x")},
     "evaluation_net": {"parameters": ("parameter",)},
+    "distinctiveness": {"left": ("y", "x"), "right": ("y", "x")},
+    "cost_margin": {"margin": ("y", "x")},
 }
 
 
@@ -24,6 +26,8 @@ def products(height: int = 11, width: int = 8) -> dict[str, dict[str, np.ndarray
         "images": {name: given["images"][name] for name in ("left", "moments")},
         "disparity": given["disparity"],
         "evaluation_net": {"parameters": to_vector(random_net())},
+        "distinctiveness": {view: np.full((height, width), 9, np.float32) for view in ("left", "right")},
+        "cost_margin": {"margin": np.full((height, width), 5, np.float32)},
     }
 
 
@@ -112,6 +116,36 @@ def test_agreement_weighs_in_by_its_power_and_not_at_all_in_the_paper_s_form() -
     less = weighed["agreement"] < 0.9
     assert less.any() and not less.all()
     assert np.array_equal(weighed["confidence"] < weighed["network"], less)
+
+
+def vetoing() -> dict[str, dict[str, np.ndarray]]:
+    """Products of which the left view says nothing at (2, 3), the costs nothing at (8, 1)."""
+    given = products()
+    given["distinctiveness"]["left"][2, 3] = 0.5
+    given["cost_margin"]["margin"][8, 1] = 0
+    return given
+
+
+def test_no_confidence_where_views_or_costs_say_nothing() -> None:
+    plain, vetoed = (
+        whole(CONFIDENCE, ConfidenceParams(precision="float32", veto=veto), vetoing(), DIMS) for veto in (False, True)
+    )
+    assert plain["confidence"].min() > 0, "the veto can be turned off"
+    changed = vetoed["confidence"] != plain["confidence"]
+    assert changed[2, 3] and changed[8, 1] and vetoed["confidence"][2, 3] == vetoed["confidence"][8, 1] == 0
+    assert changed.sum() == 2
+    assert np.array_equal(plain["network"], vetoed["network"]), "what the network said stays to be seen"
+
+
+def test_the_veto_takes_only_what_it_needs() -> None:
+    assert ConfidenceParams().inputs == CONFIDENCE.inputs
+    assert ConfidenceParams(veto=False).inputs == ("images", "disparity", "evaluation_net")
+
+
+def test_tiles_veto_as_the_whole_does() -> None:
+    params = ConfidenceParams(precision="float32")
+    one, other = tiled(CONFIDENCE, params, vetoing(), DIMS, 4), whole(CONFIDENCE, params, vetoing(), DIMS)
+    assert np.array_equal(one["confidence"] == 0, other["confidence"] == 0)
 
 
 def test_without_any_agreement_little_confidence_is_left() -> None:

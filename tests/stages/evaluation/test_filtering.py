@@ -148,3 +148,16 @@ def test_the_stage_makes_what_it_declares() -> None:
         output.name: output.dtype for output in SEMIDENSE.outputs
     }
     assert 0 < np.isnan(made["disparity"]).mean() < 1
+
+
+NOTHING_SEEN = np.array([[0.9, 0.0, 0.95, 0.0]])
+
+
+def test_a_density_never_keeps_where_nothing_was_seen() -> None:
+    assert threshold_for(1.0, np.zeros((1, 4)), NOTHING_SEEN) == 0.9
+    assert threshold_for(1.0, np.zeros((1, 4)), np.zeros((1, 4))) == 1
+
+
+def test_a_wanted_error_never_keeps_where_nothing_was_seen() -> None:
+    """Though the sure pixels would make up for them: 2.15 expected wrong of 4 are fewer than 60 %."""
+    assert threshold_for_error(0.6, np.zeros((1, 4)), NOTHING_SEEN) == 0.9
