@@ -4,7 +4,7 @@
 
     ROOT/records/ab/KEY.json        makes the entry exist; written last
     ROOT/entries/ab/KEY/            manifest.json and data.zarr/; invisible without a record
-    ROOT/drafts/LEASE-KEY/          work in progress of the run that holds the lease
+    ROOT/drafts/LEASE-HASH/         work in progress of the run that holds the lease
     ROOT/quarantine/KEY-RANDOM/     damaged entries, moved aside
     ROOT/locks/                     held locks
     ROOT/leases/LEASE               held locked by a run, with the keys that it uses: nobody cleans them away
@@ -13,6 +13,7 @@
     ROOT/CACHEDIR.TAG               makes the folder a cache, and tells backup programs to skip it
 """
 
+import hashlib
 import os
 import re
 import secrets
@@ -97,9 +98,10 @@ class Layout:
         """Return a path for a lease that nobody else has."""
         return self.leases / secrets.token_hex(16)
 
-    def draft(self, lease: str, key: str) -> Path:
-        """Return the folder in which the run that holds a lease makes ``key``: the same one for each of its tasks."""
-        return self.drafts / f"{lease}-{require_key(key)}"
+    def draft(self, lease: str, key: str, maker: str) -> Path:
+        """Return the folder in which a maker makes ``key`` for the run that holds a lease: always the same one."""
+        name = hashlib.sha256(f"{require_key(key)} {maker}".encode()).hexdigest()
+        return self.drafts / f"{lease}-{name}"
 
     def lease_of(self, draft: Path) -> Path:
         """Return the lease whose holder a draft belongs to."""

@@ -149,7 +149,7 @@ class Store:
             set_aside_if_damaged(self.layout, key, self.verify)
             raise
 
-    def begin(self, recipe: Recipe, label: Mapping[str, str], lease: Lease | None = None) -> Draft:
+    def begin(self, recipe: Recipe, label: Mapping[str, str], lease: Lease | None = None, maker: str = "") -> Draft:
         """Return a draft for the result of ``recipe``.
 
         Args:
@@ -157,6 +157,7 @@ class Store:
             label: what people call it, such as product, dataset and scene; not part of the key.
             lease: of the run that makes it. Each process of the run is given the same draft, with all that was
                 written by then. Without a lease the draft is a fresh one, which ends with this process.
+            maker: tells apart those who make the same key in one run.
 
         Raises:
             InvalidRecipe: if the label does not map text to text.
@@ -165,7 +166,7 @@ class Store:
         require_texts("label", label)
         self.layout.create()
         name = (lease and lease.name) or hold(take_lease(self.layout))
-        path = self.layout.draft(name, recipe.key)
+        path = self.layout.draft(name, recipe.key, maker)
         draft = Draft(self.root, path, recipe, plain_mapping("label", label), time())
         with writing(path):
             make_folder(path)

@@ -155,8 +155,15 @@ def _require_same(old: Entry, new: Entry) -> None:
     if old.digest != new.digest:
         raise NonDeterministicStage(
             f"{new.recipe.stage} gave two results from one recipe (key {new.key}): {old.digest} on {old.created}, "
-            f"{new.digest} now; the first is kept: find what its key lacks, or what is random in it"
+            f"{new.digest} now; the first is kept: {_suspicion(old.extras.get('cpu'), new.extras.get('cpu'))}"
         )
+
+
+def _suspicion(old: object, new: object) -> str:
+    """Return what to look for, given the CPUs that two results were made on."""
+    if old != new:
+        return f"the first was made on {old}, the second on {new}, which may round otherwise"
+    return "find what its key lacks, or what is random in it"
 
 
 def _place(layout: Layout, draft: Path, entry: Entry) -> None:

@@ -8,6 +8,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from semidense.cache import Recipe, code_parts
@@ -20,7 +21,7 @@ from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.resolution import require_trainable, resolved
 from semidense.pipeline.plan.training_split import outside, with_folds
 from semidense.stages.catalog import CATALOG, STAGES
-from semidense.stages.stage import Stage
+from semidense.stages.stage import Params, Stage
 
 PACKAGES = ("semidense",)
 NETS = ("matching_net", "descriptor_net", "evaluation_net")
@@ -51,6 +52,7 @@ class Step:
         code: hash of every module that decides the result.
         environment: what else changes its bits.
         R: the confidence threshold that a product below ``semidense`` was made with.
+        configuration: all settings of the first variant that needs it, with its own as they were resolved.
     """
 
     id: str
@@ -64,6 +66,7 @@ class Step:
     code: Mapping[str, str]
     environment: Mapping[str, str]
     R: float | None = None
+    configuration: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def product(self) -> str:
@@ -266,6 +269,15 @@ class _Builder:
         settings = params.model_dump(mode="json") | {"tiles": stage.tiling(params)}
         return self._add(stage, scene, params, settings, inputs, code_parts(stage.module, PACKAGES))
 
+    @cached_property
+    def _settings(self) -> dict[str, Any]:
+        return self.config.model_dump(mode="json")
+
+    def _configuration(self, product: str, argument: object) -> dict[str, Any]:
+        """Return all settings, a step's own as they were resolved for it."""
+        own = {product: argument.model_dump(mode="json")} if isinstance(argument, Params) else {}
+        return {**self._settings, **(own if product in self._settings else {})}
+
     def _add(
         self,
         stage: Stage,
@@ -292,5 +304,6 @@ class _Builder:
                 code=dict(code),
                 environment=environment(stage),
                 R=self.config.semidense.R if filtered else None,
+                configuration=self._configuration(stage.product, argument),
             )
         return step_id
