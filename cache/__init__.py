@@ -19,6 +19,7 @@ from semidense.cache.errors import (
     CacheUnavailable,
     DamagedArchive,
     DamagedEntry,
+    EditedSource,
     EntryNotFound,
     IncompleteDraft,
     InvalidArray,
@@ -27,7 +28,7 @@ from semidense.cache.errors import (
     NonDeterministicStage,
     SourceNotFound,
 )
-from semidense.cache.keys.code import code_hash, code_hash_of, code_parts
+from semidense.cache.keys.code import code_hash, code_hash_of, code_parts, module_hash, require_imported_as_hashed
 from semidense.cache.keys.recipe import ABSENT, Change, Recipe, differences
 from semidense.cache.processes.lease import Lease
 from semidense.cache.processes.locks import Lock
@@ -41,6 +42,7 @@ __all__ = [
     "DamagedArchive",
     "DamagedEntry",
     "Draft",
+    "EditedSource",
     "Entry",
     "EntryNotFound",
     "IncompleteDraft",
@@ -57,4 +59,6 @@ __all__ = [
     "code_hash_of",
     "code_parts",
     "differences",
+    "module_hash",
+    "require_imported_as_hashed",
 ]

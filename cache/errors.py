@@ -19,6 +19,10 @@ class SourceNotFound(CacheError, ImportError):
     """A module whose code is to be hashed has no readable Python source."""
 
 
+class EditedSource(CacheError, RuntimeError):
+    """A module was edited since it was imported: what runs is not what a hash of its file would name."""
+
+
 class EntryNotFound(CacheError, KeyError):
     """No entry has this key."""
 

@@ -25,6 +25,10 @@ _ADVICE = {
     errno.EROFS: "choose a cache folder that can be written",
     errno.ENOTDIR: "something there is a file: choose another cache folder",
     errno.EEXIST: "something there is a file: choose another cache folder",
+    errno.ELOOP: "it is a link, which the cache does not follow: remove it, or choose another cache folder",
+    errno.EMFILE: "raise the limit on open files (ulimit -n), or use fewer workers",
+    errno.ENFILE: "this machine has too many files open: close some programs",
+    errno.ENOMEM: "free some memory, or use fewer workers",
 }
 
 
@@ -62,8 +66,19 @@ def in_threads(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
         return list(pool.map(function, items))
 
 
+def is_folder(path: Path) -> bool:
+    """Return whether a folder is there itself; a link to one is none."""
+    return path.is_dir() and not path.is_symlink()
+
+
 def make_folder(path: Path) -> None:
-    """Make a folder and its parents; each new name is on disk before this returns."""
+    """Make a folder and its parents; each new name is on disk before this returns.
+
+    Raises:
+        OSError: if that is not possible, or a link stands in the folder's place.
+    """
+    if path.is_symlink():
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
     missing = [folder for folder in (path, *path.parents) if not folder.is_dir()]
     for folder in reversed(missing):
         folder.mkdir(exist_ok=True)

@@ -4,26 +4,37 @@
 
     ROOT/records/ab/KEY.json        makes the entry exist; written last
     ROOT/entries/ab/KEY/            manifest.json and data.zarr/; invisible without a record
-    ROOT/drafts/OWNER-RANDOM/       work in progress, seen by its owner alone
+    ROOT/drafts/LEASE-HASH/         work in progress of the run that holds the lease
     ROOT/quarantine/KEY-RANDOM/     damaged entries, moved aside
     ROOT/locks/                     held locks
-    ROOT/leases/OWNER-RANDOM        the keys that a running process uses: nobody cleans them away
+    ROOT/leases/LEASE               held locked by a run, with the keys that it uses: nobody cleans them away
     ROOT/sources/ab/HASH.py         the text of each module that made an entry, to say later what changed
     ROOT/checkpoints/KEY            states of long work, until its product is there
-    ROOT/CACHEDIR.TAG               tells backup programs to skip it
+    ROOT/CACHEDIR.TAG               makes the folder a cache, and tells backup programs to skip it
 """
 
+import hashlib
+import os
 import re
 import secrets
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from semidense.cache.errors import InvalidKey
-from semidense.cache.files import make_folder, writing
-from semidense.cache.owner import owner
+from semidense.cache.errors import CacheUnavailable, InvalidKey
+from semidense.cache.files import is_folder, make_folder, reading, writing
 
 _KEY = re.compile(r"[0-9a-f]{64}", re.ASCII)
+_LEASE = "[0-9a-f]{32}"
+_FORMS = {
+    "drafts": re.compile(rf"{_LEASE}-[0-9a-f]{{64}}(\.json|\.[0-9a-f]{{8}})?", re.ASCII),
+    "quarantine": re.compile(r"[0-9a-f]{64}-[0-9a-f]{8}", re.ASCII),
+    "locks": re.compile(r"[0-9a-f]{64}\.(commit|making)|leases", re.ASCII),
+    "leases": re.compile(_LEASE, re.ASCII),
+    "checkpoints": re.compile(r"[0-9a-f]{64}|\.[0-9a-f]{64}\..*", re.ASCII),
+}
+"""How the things in each folder are named. What has another name is not the cache's, and stays."""
+_TAG_NAME = "CACHEDIR.TAG"
 _TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# This folder is a cache: all in it can be made again.\n"
 
 
@@ -84,12 +95,21 @@ class Layout:
         return self.checkpoints / require_key(key)
 
     def new_lease(self) -> Path:
-        """Return a path for a lease that nobody else has; it says whose it is."""
-        return self.leases / f"{owner()}-{secrets.token_hex(8)}"
+        """Return a path for a lease that nobody else has."""
+        return self.leases / secrets.token_hex(16)
 
-    def new_draft(self) -> Path:
-        """Return a path for a draft that nobody else has; it says whose it is."""
-        return self.drafts / f"{owner()}-{secrets.token_hex(8)}"
+    def draft(self, lease: str, key: str, maker: str) -> Path:
+        """Return the folder in which a maker makes ``key`` for the run that holds a lease: always the same one."""
+        name = hashlib.sha256(f"{require_key(key)} {maker}".encode()).hexdigest()
+        return self.drafts / f"{lease}-{name}"
+
+    def lease_of(self, draft: Path) -> Path:
+        """Return the lease whose holder a draft belongs to."""
+        return self.leases / draft.name.partition("-")[0]
+
+    def trash(self, lease: str) -> Path:
+        """Return a path among the drafts of a lease that nobody else has: to delete what is moved there."""
+        return self.drafts / f"{lease}-{secrets.token_hex(32)}"
 
     def new_quarantine(self, key: str) -> Path:
         """Return a path in quarantine that nobody else has."""
@@ -103,18 +123,59 @@ class Layout:
         """Yield the key of each entry's folder, with or without a record, in order."""
         return _keys(self.entries, "")
 
-    def create(self) -> None:
-        """Make the cache's folders, if they are not there yet.
+    def things(self, folder: Path) -> list[Path]:
+        """Return what a folder of the cache holds under names of the cache's own form, in order.
+
+        A folder that is missing holds nothing; nor does a link in its place, which leads out of the cache.
 
         Raises:
-            CacheUnavailable: if they cannot be made.
+            CacheUnavailable: if the file system refuses.
+        """
+        with reading(folder):
+            names = sorted(path.name for path in folder.iterdir()) if is_folder(folder) else []
+        return [folder / name for name in names if _FORMS[folder.name].fullmatch(name)]
+
+    def require_cache(self) -> None:
+        """Refuse a folder that holds files and no tag of this cache: they are somebody's, and are not to be touched.
+
+        Raises:
+            CacheUnavailable: if it is one, or the file system refuses.
+        """
+        with reading(self.root):
+            names = [path.name for path in self.root.iterdir()] if os.path.lexists(self.root) else []
+            strange = sorted(name for name in names if not name.startswith(_TAG_NAME))
+            if strange and not self._is_tagged():
+                raise CacheUnavailable(
+                    f"{self.root} is not a cache: it holds {strange[0]!r} but no {_TAG_NAME} of this program; "
+                    "choose a new or empty folder"
+                )
+
+    def create(self) -> None:
+        """Make the cache's folders, if they are not there yet; the tag comes first.
+
+        Raises:
+            CacheUnavailable: if they cannot be made, or the folder holds files and is not a cache.
         """
         with writing(self.root):
+            if not (is_folder(self.root / "leases") and self._is_tagged()):
+                if not self.root.is_dir():  # which may be a link: the user's own choice
+                    make_folder(self.root)
+                self.require_cache()
+                self._write_tag()
             for folder in ("records", "entries", "drafts", "quarantine", "locks", "leases"):
                 make_folder(self.root / folder)
-            tag = self.root / "CACHEDIR.TAG"
-            if not tag.exists() or tag.stat().st_size != len(_TAG):  # a disk that was full may have left a part
-                tag.write_text(_TAG, encoding="ascii")
+
+    def _is_tagged(self) -> bool:
+        tag = self.root / _TAG_NAME
+        return tag.is_file() and tag.read_bytes() == _TAG.encode("ascii")
+
+    def _write_tag(self) -> None:
+        temporary = self.root / f"{_TAG_NAME}.{secrets.token_hex(4)}"
+        try:
+            temporary.write_text(_TAG, encoding="ascii")
+            temporary.replace(self.root / _TAG_NAME)
+        finally:
+            temporary.unlink(missing_ok=True)
 
 
 def is_key(text: str) -> bool:
@@ -135,7 +196,12 @@ def require_key(key: str) -> str:
 
 def _keys(folder: Path, suffix: str) -> Iterator[str]:
     """Yield the keys in a folder of two-digit folders; what is not named like a key is not ours."""
-    for path in sorted(folder.glob(f"??/*{suffix}")):
-        key = path.name.removesuffix(suffix)
-        if _KEY.fullmatch(key) and path.name == key + suffix and path.parent.name == key[:2]:
-            yield key
+    with reading(folder):
+        shelves = sorted(folder.iterdir()) if is_folder(folder) else []
+    for shelf in filter(is_folder, shelves):
+        with reading(shelf):
+            names = sorted(path.name for path in shelf.iterdir())
+        for name in names:
+            key = name.removesuffix(suffix)
+            if _KEY.fullmatch(key) and name == key + suffix and shelf.name == key[:2]:
+                yield key

@@ -1,5 +1,6 @@
 """The cache as its users see it: find, require, open, begin."""
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
@@ -10,22 +11,24 @@ from typing import TYPE_CHECKING, Any
 from semidense.cache.document import plain_mapping
 from semidense.cache.entries import publish
 from semidense.cache.entries.check import Finding, Policy, inspect, read_record
-from semidense.cache.entries.draft import Draft
+from semidense.cache.entries.draft import Draft, hold
 from semidense.cache.entries.entry import Entry
 from semidense.cache.entries.quarantine import set_aside_if_damaged
 from semidense.cache.errors import CacheUnavailable, DamagedEntry, EntryNotFound
-from semidense.cache.files import make_folder, reading, remove, writing
+from semidense.cache.files import make_folder, remove, writing
 from semidense.cache.keys.recipe import Recipe, require_texts
 from semidense.cache.keys.sources import keep_sources, kept_source
 from semidense.cache.layout import Layout
-from semidense.cache.owner import is_abandoned
-from semidense.cache.processes.lease import Lease, leased, sweep_checkpoints, sweep_locks
+from semidense.cache.processes.lease import Lease, is_abandoned, leased, sweep_checkpoints, sweep_locks, take_lease
 from semidense.cache.processes.locks import Lock, holder, try_lock
 
 if TYPE_CHECKING:
     import xarray
     import zarr
     from numpy.typing import NDArray
+
+
+_URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/.*", re.ASCII)
 
 
 @dataclass(frozen=True, init=False)
@@ -40,6 +43,10 @@ class Store:
         verify: how much of an entry is checked before it is used. ``full``: every byte, once a
             process for a file that does not change. ``size``: which files there are, and their
             sizes. ``off``: record and manifest alone.
+
+    Raises:
+        CacheUnavailable: if ``root`` is a URL: a cache is a folder.
+        ValueError: if ``verify`` is none of the three.
     """
 
     root: Path
@@ -48,6 +55,10 @@ class Store:
     def __init__(self, root: Path, verify: Policy = "full") -> None:
         if verify not in ("full", "size", "off"):
             raise ValueError(f"verify is {verify!r}: it must be full, size or off")
+        if _URL.fullmatch(str(root)):
+            raise CacheUnavailable(
+                f"{root} is a URL, and a cache is a folder: name a folder of this machine or a share"
+            )
         object.__setattr__(self, "root", Path(root).absolute())
         object.__setattr__(self, "verify", verify)
 
@@ -138,12 +149,15 @@ class Store:
             set_aside_if_damaged(self.layout, key, self.verify)
             raise
 
-    def begin(self, recipe: Recipe, label: Mapping[str, str]) -> Draft:
-        """Return a fresh draft for the result of ``recipe``.
+    def begin(self, recipe: Recipe, label: Mapping[str, str], lease: Lease | None = None, maker: str = "") -> Draft:
+        """Return a draft for the result of ``recipe``.
 
         Args:
             recipe: what it is made from.
             label: what people call it, such as product, dataset and scene; not part of the key.
+            lease: of the run that makes it. Each process of the run is given the same draft, with all that was
+                written by then. Without a lease the draft is a fresh one, which ends with this process.
+            maker: tells apart those who make the same key in one run.
 
         Raises:
             InvalidRecipe: if the label does not map text to text.
@@ -151,14 +165,21 @@ class Store:
         """
         require_texts("label", label)
         self.layout.create()
-        draft = Draft(self.root, self.layout.new_draft(), recipe, plain_mapping("label", label), time())
-        with writing(draft.path):
-            make_folder(draft.path)
+        name = (lease and lease.name) or hold(take_lease(self.layout))
+        path = self.layout.draft(name, recipe.key, maker)
+        draft = Draft(self.root, path, recipe, plain_mapping("label", label), time())
+        with writing(path):
+            make_folder(path)
         publish.STEP_HOOK("begun")
         return draft
 
     def entries(self) -> Iterator[Entry]:
-        """Yield every entry with a well-formed record, in the order of keys."""
+        """Yield every entry with a well-formed record, in the order of keys.
+
+        Raises:
+            CacheUnavailable: if the folder is not a cache, or the file system refuses.
+        """
+        self.layout.require_cache()
         return (entry for key in self.layout.record_keys() if (entry := self.find(key)))
 
     def history(self, label: Mapping[str, str]) -> list[Entry]:
@@ -200,10 +221,13 @@ class Store:
         return kept_source(self.layout, code_hash)
 
     def sweep_drafts(self) -> int:
-        """Delete what dead processes of this host left: drafts, which it counts, locks, done checkpoints."""
-        drafts = self.layout.drafts
-        with reading(drafts):
-            abandoned = [path for path in drafts.iterdir() if is_abandoned(path.name)] if drafts.is_dir() else []
+        """Delete what dead runs left: drafts, which it counts, locks, done checkpoints.
+
+        Raises:
+            CacheUnavailable: if the folder is not a cache, or the file system refuses.
+        """
+        self.layout.require_cache()
+        abandoned = [path for path in self.layout.things(self.layout.drafts) if is_abandoned(self.layout, path)]
         for path in abandoned:
             remove(path)
         with suppress(CacheUnavailable):

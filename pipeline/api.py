@@ -171,7 +171,7 @@ def carry_out(
 ) -> Result:
     """Make what a request asks for; see ``run``."""
     store = open_store(task.cache)
-    extras = provenance(sys.argv, next(iter(request.configs.values())).to_dict())
+    extras = provenance(sys.argv)
 
     def make(wanted: Request, forced: Iterable[str] = ()) -> tuple[Plan, dict[str, Made]]:
         planned = functools.partial(make_plan, wanted, store, forced)

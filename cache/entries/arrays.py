@@ -53,9 +53,14 @@ def check_arrays(folder: Path, manifest: Manifest, largest: int) -> None:
         raise ValueError(f"{min(paths ^ expected)} is {'missing' if min(paths ^ expected) in expected else 'no chunk'}")
 
 
-def chunk_paths(shape: Sequence[int], chunks: Sequence[int]) -> Iterator[str]:
-    """Yield the path of every chunk of an array of some shape and chunk shape, relative to the array's folder."""
-    return ("/".join(("c", *map(str, place))) for place in product(*map(range, _counts(shape, chunks))))
+def chunk_paths(shape: Sequence[int], chunks: Sequence[int], region: Sequence[slice] | None = None) -> Iterator[str]:
+    """Yield the path of every chunk of an array, or of a region of whole chunks, relative to the array's folder."""
+    parts = region or [slice(None)] * len(shape)
+    ranges = [
+        range((part.start or 0) // chunk, -(-(length if part.stop is None else part.stop) // chunk))
+        for part, length, chunk in zip(parts, shape, chunks, strict=True)
+    ]
+    return ("/".join(("c", *map(str, place))) for place in product(*ranges))
 
 
 def _counts(shape: Sequence[int], chunks: Sequence[int]) -> list[int]:

@@ -83,16 +83,21 @@ def inspect(layout: Layout, key: str, policy: Policy, remember: bool = True) -> 
         DamagedEntry: naming the first thing that is wrong.
         CacheUnavailable: if the file system refuses.
     """
-    entry, folder = read_record(layout, key), layout.entry(key)
+    return inspect_data(layout, read_record(layout, key), policy, remember)
+
+
+def inspect_data(layout: Layout, entry: Entry, policy: Policy, remember: bool = True) -> Finding:
+    """Compare an entry's data with what its record, given here, says of them; see ``inspect``."""
+    folder = layout.entry(entry.key)
     with reading(folder):
         try:
             manifest = _read_manifest(folder, entry)
             if policy != "off":
                 _compare_files(folder, manifest, policy, remember)
         except (FileNotFoundError, NotADirectoryError) as error:
-            raise DamagedEntry(f"the entry {key} is damaged: {error.filename} is missing") from None
+            raise DamagedEntry(f"the entry {entry.key} is damaged: {error.filename} is missing") from None
         except DamagedEntry as error:
-            raise DamagedEntry(f"the entry {key} is damaged: {error}") from None
+            raise DamagedEntry(f"the entry {entry.key} is damaged: {error}") from None
     return Finding(entry, manifest)
 
 

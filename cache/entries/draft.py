@@ -16,9 +16,10 @@ from semidense.cache.entries import publish
 from semidense.cache.entries.arrays import chunk_paths
 from semidense.cache.entries.entry import DATA, Entry
 from semidense.cache.errors import IncompleteDraft, InvalidArray
-from semidense.cache.files import remove, writing
+from semidense.cache.files import writing
 from semidense.cache.keys.recipe import Recipe
 from semidense.cache.layout import Layout
+from semidense.cache.processes.locks import Lock
 
 if TYPE_CHECKING:
     import numpy as np
@@ -28,6 +29,14 @@ if TYPE_CHECKING:
 ZSTD_LEVEL = 1
 """Higher levels cost more time than they save space on float maps and float16 volumes."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
+_own: dict[str, Lock] = {}
+"""Leases of drafts that belong to no run, by their name: held until the draft is published or deleted."""
+
+
+def hold(lease: Lock) -> str:
+    """Hold a lease for one draft alone, which is then to have its name; return the name."""
+    _own[lease.path.name] = lease
+    return lease.path.name
 
 
 @dataclass(frozen=True)
@@ -35,7 +44,7 @@ class Draft:
     """A result in the making, from ``Store.begin``; other processes and threads can write through a copy.
 
     As a context manager it publishes at the end of the block, unless the block did, and leaves
-    nothing when the block fails.
+    nothing when the block fails. ``holds`` and ``published`` find what a writer did that was killed since.
 
     Attributes:
         root: the cache's folder.
@@ -151,6 +160,33 @@ class Draft:
             array[tuple(slice(*pair) for pair in bounds)] = data
         publish.STEP_HOOK("chunk written")
 
+    def has_array(self, name: str) -> bool:
+        """Return whether ``create_array`` made an array of this name."""
+        return bool(_NAME.fullmatch(name)) and self._about(name).is_file()
+
+    def holds(self, name: str, region: tuple[slice, ...] | None = None) -> bool:
+        """Return whether a region of an array was written, by whichever process; None: all of the array.
+
+        Args:
+            name: of an array, made or not.
+            region: as for ``write``.
+        """
+        if not self.has_array(name):
+            return False
+        about = json.loads(self._about(name).read_bytes())
+        shape, chunks = about["shape"], about["chunk_grid"]["configuration"]["chunk_shape"]
+        return all((self.path / DATA / name / chunk).is_file() for chunk in chunk_paths(shape, chunks, region))
+
+    def published(self) -> Entry | None:
+        """Return the entry that the draft became; None if it became none, or is still there.
+
+        Where a publisher was killed between its last steps, they are done now.
+
+        Raises:
+            CacheUnavailable: if the file system refuses.
+        """
+        return publish.resume(Layout(self.root), self.path, self.recipe.key)
+
     def publish(self, seconds: float, extras: Mapping[str, Any]) -> Entry:
         """Make the draft an entry that everybody sees; the draft is gone afterwards, also when this fails.
 
@@ -182,7 +218,9 @@ class Draft:
 
     def discard(self) -> None:
         """Delete the draft; nothing happens if it was published or deleted before."""
-        remove(self.path)
+        publish.discard(self.path)
+        if own := _own.pop(self.path.name.partition("-")[0], None):
+            own.release()
 
     def __enter__(self) -> Self:
         return self
@@ -202,6 +240,9 @@ class Draft:
             raise InvalidArray(f"the draft of {self.recipe.stage} is gone: {self.path} was published or deleted")
         with writing(self.path):
             yield
+
+    def _about(self, name: str) -> Path:
+        return self.path / DATA / name / "zarr.json"
 
     def _metadata(self) -> dict[str, dict[str, Any]]:
         """Return what zarr wrote of each array that is there.

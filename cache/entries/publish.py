@@ -3,21 +3,25 @@
 1. every chunk is there, and nothing else;
 2. each file is hashed, synced and made read-only;
 3. the manifest is written, the folders are synced and made read-only;
-4. the draft is renamed to its place among the entries; nobody sees it yet;
-5. the record is written beside the drafts and linked to its name: now the entry exists.
+4. the record is written beside the draft;
+5. the draft is renamed to its place among the entries; nobody sees it yet;
+6. the record is linked to its name: now the entry exists.
 
-A kill at any point leaves a whole entry or nothing that anybody sees. A second writer of the same
+A kill at any point leaves a whole entry or nothing that anybody sees, and another process of the same
+run can go on from there: ``resume`` finds the data that were renamed by the record beside the draft.
+A second writer of the same
 key compares digests and drops its own copy. The commit lock spares two writers from tripping over
 each other; should it fail, as on some network disks, the link still lets only one record win,
 and a record never fits another content.
 """
 
 import os
+import secrets
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
-from semidense.cache.entries.check import inspect
+from semidense.cache.entries.check import inspect, inspect_data, read_plain
 from semidense.cache.entries.entry import MANIFEST, Entry, File, Manifest
 from semidense.cache.entries.quarantine import move_anything, set_aside
 from semidense.cache.errors import DamagedEntry, EntryNotFound, NonDeterministicStage
@@ -32,6 +36,7 @@ from semidense.cache.files import (
     walk,
     walk_folders,
     write_synced,
+    writing,
 )
 from semidense.cache.layout import Layout
 from semidense.cache.processes.locks import held
@@ -45,10 +50,10 @@ STEPS = (
     "manifest written",
     "sealed",
     "locked",
+    "record written",
     "cleared",
     "renamed",
     "entry synced",
-    "record written",
     "record linked",
     "published",
 )
@@ -103,10 +108,32 @@ def commit(layout: Layout, draft: Path, entry: Entry) -> Entry:
         STEP_HOOK("locked")
         published = _published(layout, draft, entry)
         if published is None:
+            _write_record(draft, entry)
             _place(layout, draft, entry)
             published = _link_record(layout, draft, entry)
     STEP_HOOK("published")
     return published
+
+
+def resume(layout: Layout, draft: Path, key: str) -> Entry | None:
+    """Return the entry that a draft became, after the last steps if its publisher was killed before them.
+
+    None if the draft is still there, or became no entry.
+
+    Raises:
+        CacheUnavailable: if the file system refuses.
+    """
+    if draft.is_dir():
+        return None
+    with writing(draft), held(layout.lock("commit", key)):
+        with suppress(EntryNotFound, DamagedEntry):
+            return inspect(layout, key, "full").entry
+        with suppress(FileNotFoundError, DamagedEntry):
+            entry = Entry.from_bytes(key, read_plain(_record_beside(draft)))
+            inspect_data(layout, entry, "full", remember=False)
+            _settle(layout.entry(key))
+            return _link_record(layout, draft, entry)
+    return None
 
 
 def _published(layout: Layout, draft: Path, entry: Entry) -> Entry | None:
@@ -128,8 +155,15 @@ def _require_same(old: Entry, new: Entry) -> None:
     if old.digest != new.digest:
         raise NonDeterministicStage(
             f"{new.recipe.stage} gave two results from one recipe (key {new.key}): {old.digest} on {old.created}, "
-            f"{new.digest} now; the first is kept: find what its key lacks, or what is random in it"
+            f"{new.digest} now; the first is kept: {_suspicion(old.extras.get('cpu'), new.extras.get('cpu'))}"
         )
+
+
+def _suspicion(old: object, new: object) -> str:
+    """Return what to look for, given the CPUs that two results were made on."""
+    if old != new:
+        return f"the first was made on {old}, the second on {new}, which may round otherwise"
+    return "find what its key lacks, or what is random in it"
 
 
 def _place(layout: Layout, draft: Path, entry: Entry) -> None:
@@ -137,25 +171,44 @@ def _place(layout: Layout, draft: Path, entry: Entry) -> None:
     target = layout.entry(entry.key)
     make_folder(target.parent)
     if os.path.lexists(target):
-        orphan = layout.new_draft()
+        orphan = draft.with_name(f"{draft.name}.{secrets.token_hex(4)}")
         move_anything(target, orphan)
         remove(orphan)
     STEP_HOOK("cleared")
     move_folder(draft, target)
     STEP_HOOK("renamed")
-    make_read_only(target)
-    sync(target)
-    sync(target.parent)
+    _settle(target)
     STEP_HOOK("entry synced")
 
 
+def _settle(folder: Path) -> None:
+    make_read_only(folder)
+    sync(folder)
+    sync(folder.parent)
+
+
+def _record_beside(draft: Path) -> Path:
+    return draft.with_name(f"{draft.name}.json")
+
+
+def _write_record(draft: Path, entry: Entry) -> None:
+    """Write the record under another name, in place of one by a publisher that was killed."""
+    remove(_record_beside(draft))
+    write_synced(_record_beside(draft), entry.to_bytes())
+    STEP_HOOK("record written")
+
+
+def discard(draft: Path) -> None:
+    """Delete a draft, and the record beside it."""
+    remove(draft)
+    remove(_record_beside(draft))
+
+
 def _link_record(layout: Layout, draft: Path, entry: Entry) -> Entry:
-    """Write the record whole under another name, then link it: a link never replaces a record."""
-    temporary, record = draft.with_name(f"{draft.name}.json"), layout.record(entry.key)
+    """Link the record, which is whole under another name: a link never replaces a record."""
+    temporary, record = _record_beside(draft), layout.record(entry.key)
     make_folder(record.parent)
     try:
-        write_synced(temporary, entry.to_bytes())
-        STEP_HOOK("record written")
         record.hardlink_to(temporary)
     except FileExistsError:
         found = inspect(layout, entry.key, "full").entry

@@ -11,6 +11,9 @@ from semidense.cache.entries.entry import DATA, Manifest
 from semidense.cache.errors import DamagedEntry
 
 if TYPE_CHECKING:
+    import builtins
+    from collections.abc import AsyncIterator, Iterable
+
     import xarray as xr
     from zarr.abc.store import ByteRequest
     from zarr.core.buffer import Buffer, BufferPrototype
@@ -53,6 +56,41 @@ class EntryStore(LocalStore):
         if key not in self._sizes:
             return None
         return self._require(key, super().get_sync(key, prototype=prototype, byte_range=byte_range), byte_range)
+
+    async def get_partial_values(
+        self,
+        prototype: "BufferPrototype",
+        key_ranges: "Iterable[tuple[str, ByteRequest | None]]",
+    ) -> "builtins.list[Buffer | None]":
+        """Return parts of files of the manifest, each as ``get`` does."""
+        return [await self.get(key, prototype, part) for key, part in key_ranges]
+
+    async def getsize(self, key: str) -> int:
+        """Return the size of a file of the manifest; FileNotFoundError if the manifest lists none."""
+        if key not in self._sizes:
+            raise FileNotFoundError(key)
+        return self._sizes[key]
+
+    async def exists(self, key: str) -> bool:
+        """Return whether the manifest lists a file."""
+        return key in self._sizes
+
+    async def list(self) -> "AsyncIterator[str]":
+        """Yield the files of the manifest."""
+        for key in self._sizes:
+            yield key
+
+    async def list_prefix(self, prefix: str) -> "AsyncIterator[str]":
+        """Yield the files of the manifest whose path begins so."""
+        for key in self._sizes:
+            if key.startswith(prefix):
+                yield key
+
+    async def list_dir(self, prefix: str) -> "AsyncIterator[str]":
+        """Yield the names in a folder of the manifest."""
+        start = f"{prefix.rstrip('/')}/" if prefix else ""
+        for name in dict.fromkeys(key[len(start) :].partition("/")[0] for key in self._sizes if key.startswith(start)):
+            yield name
 
     def _require(self, key: str, data: "Buffer | None", byte_range: "ByteRequest | None") -> "Buffer":
         """Refuse a file that is no longer the one that the manifest lists."""

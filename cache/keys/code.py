@@ -4,13 +4,17 @@ Followed are import statements anywhere in a file, relative ones too, ``import_m
 literal name, and the ``__init__`` of every parent package, which Python runs first. What stands
 under ``if TYPE_CHECKING`` never runs; it tells where a package's names come from that are imported
 when they are used, and those that a file takes are followed. Not followed is a submodule that is
-only reached as an attribute and that another module imports.
-Modules are found and parsed, never imported.
+only reached as an attribute and that another module imports. Modules are found and parsed, never
+imported. A module that runs already must have been imported from the text that is hashed: one whose
+file changed since this process began is refused.
 """
 
 import ast
 import hashlib
-from collections.abc import Iterator, Mapping
+import os
+import sys
+import time
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec, resolve_name
@@ -18,7 +22,7 @@ from pathlib import Path
 from typing import TypeGuard
 
 from semidense.cache.document import digest
-from semidense.cache.errors import SourceNotFound
+from semidense.cache.errors import EditedSource, SourceNotFound
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,7 @@ def code_parts(module: str, packages: tuple[str, ...]) -> dict[str, str]:
 
     Raises:
         SourceNotFound: if ``module`` has no Python source, or a file cannot be read or parsed.
+        EditedSource: if the file of a module that was imported changed since this process began.
     """
     return dict(_parts(module, packages))
 
@@ -75,8 +80,9 @@ def _parts(module: str, packages: tuple[str, ...]) -> Mapping[str, str]:
     while waiting:
         name = waiting.pop()
         if name not in found and (located := _locate(name)) and located.file:
-            found[name], imports, _ = _read(located)
-            followed = (each for each in (name, *imports) if each.partition(".")[0] in packages)
+            source = _read(located)
+            found[name] = source.hash
+            followed = (each for each in (name, *source.imports) if each.partition(".")[0] in packages)
             waiting += (part for each in followed for part in _parents(each))
     return dict(sorted(found.items()))
 
@@ -84,7 +90,37 @@ def _parts(module: str, packages: tuple[str, ...]) -> Mapping[str, str]:
 def source_text(module: str) -> str | None:
     """Return the text that ``code_parts`` hashed for a module, None if it has none."""
     located = _locate(module)
-    return _read(located)[2] if located and located.file else None
+    return _read(located).text if located and located.file else None
+
+
+def module_hash(module: str) -> str | None:
+    """Return the hash that ``code_parts`` gives one module here, None if it has no source here.
+
+    Raises:
+        SourceNotFound, EditedSource: as ``code_parts`` does.
+    """
+    located = _locate(module)
+    return _read(located).hash if located and located.file else None
+
+
+def require_imported_as_hashed(modules: Iterable[str]) -> None:
+    """Refuse a module that was hashed first, edited then, and imported after that: it runs under another text's key.
+
+    Args:
+        modules: names; those that were never imported, or were when they were hashed, need no look.
+
+    Raises:
+        EditedSource: naming the file.
+    """
+    for name in modules:
+        if name in _settled or name not in sys.modules:
+            continue
+        located = _locate(name)
+        if located and located.file:
+            known = _read(located)
+            if _stamp(located.file) != known.stamp and source_hash(located.file.read_bytes()) != known.hash:
+                raise EditedSource(_edited(located.file))
+        _settled.add(name)
 
 
 def bare_tree(text: str | bytes) -> ast.AST:
@@ -147,15 +183,58 @@ def _locate_by_import_system(name: str) -> _Module | None:
     return _Module(name, file, folders) if file or folders else None
 
 
+_Stamp = tuple[int, int, int]
+_settled: set[str] = set()
+"""Modules that are known to run the text that was hashed; what happens to their files does not matter any more."""
+
+
+@dataclass(frozen=True)
+class _Source:
+    """A module's source: the hash of its tree, the dotted names that it may import, its text, and its file's stamp."""
+
+    hash: str
+    imports: frozenset[str]
+    text: str
+    stamp: _Stamp
+
+
 @cache
-def _read(module: _Module) -> tuple[str, frozenset[str], str]:
-    """Return the hash of a module's tree, the dotted names that it may import, and its text."""
+def _read(module: _Module) -> _Source:
+    file, is_imported = module.file or Path(), module.name in sys.modules
     try:
-        data = module.file.read_bytes() if module.file else b""
+        stamp, data = _stamp(file), file.read_bytes()
         imports, hashed = frozenset(_imports(ast.parse(data), module)), source_hash(data)
     except (OSError, SyntaxError, ValueError, RecursionError) as error:
         raise SourceNotFound(f"cannot read the source {module.file}: {error}") from error
-    return hashed, imports, data.decode("utf-8", "replace")
+    if is_imported:
+        if file.stat().st_ctime > _process_start() + _TICK:
+            raise EditedSource(_edited(file))
+        _settled.add(module.name)
+    return _Source(hashed, imports, data.decode("utf-8", "replace"), stamp)
+
+
+def _edited(file: Path) -> str:
+    return f"{file} was edited since this Python began, and may have been imported before: restart Python (the kernel)"
+
+
+def _stamp(file: Path) -> _Stamp:
+    status = file.stat()
+    return status.st_ctime_ns, status.st_size, status.st_ino
+
+
+_TICK = 0.02
+"""Seconds: the kernel tells a process's start to 0.01 s, and no import happens so soon after it."""
+_IMPORTED = time.time()
+
+
+@cache
+def _process_start() -> float:
+    """Return when this process began, in seconds since the epoch; where that is not told, when this was imported."""
+    try:
+        ticks = int(Path("/proc/self/stat").read_text(errors="replace").rpartition(")")[2].split()[19])
+        return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME) + ticks / os.sysconf("SC_CLK_TCK")
+    except (OSError, AttributeError):
+        return _IMPORTED
 
 
 class _Bare(ast.NodeTransformer):

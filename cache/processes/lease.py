@@ -1,7 +1,8 @@
 """What running processes use: each keeps a list of keys, and nobody cleans away what is on a list.
 
 A lease is a file that its process holds locked, so it ends with the process, however that ends. Adding to a
-lease and cleaning exclude each other: an entry that is there after it was added stays there.
+lease and cleaning exclude each other: an entry that is there after it was added stays there. Drafts carry the
+name of their run's lease: they are alive as long as it is held, whoever writes them.
 """
 
 import os
@@ -12,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from semidense.cache.errors import CacheUnavailable
-from semidense.cache.files import reading, remove, writing
+from semidense.cache.files import remove, writing
 from semidense.cache.layout import Layout, is_key, require_key
-from semidense.cache.processes.locks import held, is_held, lock, try_lock
+from semidense.cache.processes.locks import Lock, held, is_held, lock, try_lock
 
 _LINE = re.compile(r"^([0-9a-f]{64})\n", re.ASCII | re.MULTILINE)
 
@@ -31,6 +32,22 @@ class Lease:
     root: Path
     path: Path | None
 
+    @property
+    def name(self) -> str | None:
+        """What the drafts of its run begin with; None in a cache that cannot be written."""
+        return self.path.name if self.path else None
+
+    def discard_drafts(self) -> None:
+        """Delete all drafts of its run, whichever process began them.
+
+        Raises:
+            CacheUnavailable: if the file system refuses.
+        """
+        layout = Layout(self.root)
+        for draft in layout.things(layout.drafts) if self.path else ():
+            if layout.lease_of(draft) == self.path:
+                remove(draft)
+
     def add(self, keys: Iterable[str]) -> None:
         """Keep the entries of these keys, those that are yet to come too, and note that they are in use.
 
@@ -43,7 +60,7 @@ class Lease:
         if not lines or self.path is None:
             return
         with cleaning(layout), writing(self.path):
-            handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
+            handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
             try:
                 os.write(handle, lines.encode("ascii"))
             finally:
@@ -56,18 +73,26 @@ class Lease:
 @contextmanager
 def leased(layout: Layout) -> Iterator[Lease]:
     """Open a lease and end it with the block."""
-    path = layout.new_lease()
     try:
-        layout.create()
-        with cleaning(layout):
-            mine = lock(path)
+        mine = take_lease(layout)
     except CacheUnavailable:
         yield Lease(layout.root, None)
         return
     try:
-        yield Lease(layout.root, path)
+        yield Lease(layout.root, mine.path)
     finally:
         mine.release()
+
+
+def take_lease(layout: Layout) -> Lock:
+    """Return the lock of a new lease.
+
+    Raises:
+        CacheUnavailable: if the cache cannot be written.
+    """
+    layout.create()
+    with cleaning(layout):
+        return lock(layout.new_lease())
 
 
 @contextmanager
@@ -80,12 +105,15 @@ def cleaning(layout: Layout) -> Iterator[None]:
 def in_use(layout: Layout) -> frozenset[str]:
     """Return the keys on the lists of running processes."""
     found: set[str] = set()
-    with reading(layout.leases):
-        for path in layout.leases.iterdir() if layout.leases.is_dir() else ():
-            if is_held(path):
-                with suppress(FileNotFoundError):
-                    found.update(_LINE.findall(path.read_text(encoding="ascii", errors="replace")))
+    for path in filter(is_held, layout.things(layout.leases)):
+        with suppress(FileNotFoundError):
+            found.update(_LINE.findall(path.read_text(encoding="ascii", errors="replace")))
     return frozenset(found)
+
+
+def is_abandoned(layout: Layout, draft: Path) -> bool:
+    """Return whether the run that a draft belongs to is gone: nobody holds its lease."""
+    return not is_held(layout.lease_of(draft))
 
 
 def sweep_locks(layout: Layout) -> None:
@@ -94,10 +122,8 @@ def sweep_locks(layout: Layout) -> None:
     Raises:
         CacheUnavailable: if the file system refuses.
     """
-    for folder in (layout.locks, layout.leases):
-        with reading(folder):
-            stale = [path for path in folder.iterdir() if not is_held(path)] if folder.is_dir() else []
-        for path in stale:
+    for path in (*layout.things(layout.locks), *layout.things(layout.leases)):
+        if not is_held(path):
             remove_stale(layout, path)
 
 
@@ -110,7 +136,10 @@ def remove_stale(layout: Layout, path: Path) -> bool:
 
 
 def _remove_unheld(path: Path) -> bool:
-    taken = try_lock(path) if path.exists() else None
+    if not path.is_file() or path.is_symlink():
+        remove(path)  # a pipe or a link in a lock's place
+        return True
+    taken = try_lock(path)
     if taken:
         taken.release()
     return taken is not None
@@ -122,8 +151,6 @@ def sweep_checkpoints(layout: Layout) -> None:
     Raises:
         CacheUnavailable: if the file system refuses.
     """
-    with reading(layout.checkpoints):
-        names = [path.name for path in layout.checkpoints.iterdir()] if layout.checkpoints.is_dir() else []
-    for key in filter(is_key, names):
+    for key in filter(is_key, (path.name for path in layout.things(layout.checkpoints))):
         if layout.record(key).exists() and not is_held(layout.lock("making", key)):
             remove(layout.checkpoint(key))

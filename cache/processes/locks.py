@@ -3,8 +3,10 @@
 A lock saves work, it is never what makes a result right: the digests in the records do that.
 """
 
+import errno
 import fcntl
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -15,6 +17,8 @@ from semidense.cache.files import writing
 from semidense.cache.owner import describe, owner
 
 _LONGEST = 512
+_CAREFULLY = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+"""A pipe in a lock's place must not make anybody wait, nor a link lead out of the cache."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ def try_lock(path: Path) -> Lock | None:
 def is_held(path: Path) -> bool:
     """Return whether a process or thread holds the lock of this name; its file stays as it is."""
     try:
-        handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+        handle = os.open(path, os.O_RDONLY | _CAREFULLY)
     except OSError:
         return False
     try:
@@ -91,7 +95,8 @@ def is_held(path: Path) -> bool:
 def holder(path: Path) -> str | None:
     """Return who holds a lock, for people: ``process 123 on host``; None if nobody says so."""
     try:
-        with path.open(encoding="ascii", errors="replace") as file:
+        handle = os.open(path, os.O_RDONLY | _CAREFULLY)
+        with os.fdopen(handle, encoding="ascii", errors="replace") as file:
             return describe(file.readline(_LONGEST).rstrip())
     except OSError:
         return None
@@ -103,8 +108,10 @@ class _Busy(CacheError):  # noqa: N818
 
 def _attempt(path: Path, operation: int) -> Lock | None:
     """Lock the file that the path names now; None if it names another one by the time that it is locked."""
-    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    handle = os.open(path, os.O_RDWR | os.O_CREAT | _CAREFULLY, 0o666)
     try:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError(errno.EINVAL, "something there is not a plain file", str(path))
         fcntl.flock(handle, operation)
         if _is_same(handle, path):
             _sign(handle)

@@ -17,16 +17,13 @@ from semidense.cache.entries.check import read_plain
 from semidense.cache.entries.entry import Entry
 from semidense.cache.entries.quarantine import move_anything
 from semidense.cache.errors import CacheUnavailable
-from semidense.cache.files import make_folder, reading, remove, walk, writing
+from semidense.cache.files import make_folder, remove, walk, writing
 from semidense.cache.layout import Layout
-from semidense.cache.owner import is_abandoned, is_foreign
-from semidense.cache.processes.lease import cleaning, in_use, remove_stale
+from semidense.cache.processes.lease import Lease, cleaning, in_use, is_abandoned, leased, remove_stale
 from semidense.cache.processes.locks import held, is_held
 from semidense.cache.store import Store
 
 Kind = Literal["entry", "draft", "orphan", "old format", "damaged record", "quarantine", "checkpoint", "stale lock"]
-FOREIGN_SECONDS = 7 * 86400.0
-"""After this time without a change, a draft of another host belongs to a process that is gone."""
 
 
 @dataclass(frozen=True)
@@ -140,18 +137,16 @@ def _leftovers(layout: Layout, sound: Iterable[str], used: Container[str]) -> It
     for key in layout.entry_keys():
         if key not in entries and key not in broken:
             yield _item("orphan", key, "data without a record: its writer was killed", layout.entry(key))
-    for path in _things(layout.drafts):
-        if is_abandoned(path.name):
-            yield _item("draft", path.name, "its process is gone", path)
-        elif is_foreign(path.name) and time.time() - _changed(path) > FOREIGN_SECONDS:
-            yield _item("draft", path.name, "of another host, unchanged for a week", path)
-    for path in _things(layout.quarantine):
+    for path in layout.things(layout.drafts):
+        if is_abandoned(layout, path):
+            yield _item("draft", path.name, "its run is gone", path)
+    for path in layout.things(layout.quarantine):
         yield _item("quarantine", path.name, "damaged, and made again when it is needed", path)
-    for path in _things(layout.checkpoints):
+    for path in layout.things(layout.checkpoints):
         key = path.name.removeprefix(".")[:64]  # of a half-written one too
         if key not in used and (key in entries or path.name.startswith(".")):
             yield _item("checkpoint", key, "its product is there, or its writer was killed", path)
-    for path in (*_things(layout.locks), *_things(layout.leases)):
+    for path in (*layout.things(layout.locks), *layout.things(layout.leases)):
         if not is_held(path):
             yield _item("stale lock", path.name, "its process is gone", path)
 
@@ -174,18 +169,6 @@ def _item(kind: Kind, name: str, reason: str, *paths: Path) -> Item:
     return Item(kind, name, reason, sum(map(_bytes, paths)), paths)
 
 
-def _things(folder: Path) -> list[Path]:
-    with reading(folder):
-        return sorted(folder.iterdir()) if folder.is_dir() else []
-
-
-def _changed(path: Path) -> float:
-    try:
-        return path.lstat().st_mtime
-    except OSError:
-        return time.time()
-
-
 def _bytes(path: Path) -> int:
     try:
         if path.is_symlink() or not path.is_dir():
@@ -205,23 +188,30 @@ def collect(store: Store, items: Iterable[Item]) -> tuple[Item, ...]:
     Raises:
         CacheUnavailable: if the file system refuses; what was deleted by then stays deleted.
     """
-    layout, trash, done, items = store.layout, store.layout.new_draft(), [], tuple(items)
+    layout = store.layout
+    layout.require_cache()
+    items = tuple(items)
+    with leased(layout) as lease:
+        done = _delete(layout, lease, [item for item in items if item.kind != "stale lock"])
+    done += [item for item in items if item.kind == "stale lock" and remove_stale(layout, item.paths[0])]
+    return tuple(done)
+
+
+def _delete(layout: Layout, lease: Lease, items: Iterable[Item]) -> list[Item]:
+    """Move things out of sight and delete them; return those that nobody uses and that were still there."""
+    trash = layout.trash(lease.name or "0" * 32)
     try:
         with writing(layout.root):
             make_folder(trash)
         with cleaning(layout):
             used = in_use(layout)
-            for number, item in enumerate(items):
-                if (
-                    item.kind != "stale lock"
-                    and item.name not in used
-                    and _move_away(layout, item, trash / str(number))
-                ):
-                    done.append(item)
-        done += [item for item in items if item.kind == "stale lock" and remove_stale(layout, item.paths[0])]
+            return [
+                item
+                for number, item in enumerate(items)
+                if item.name not in used and _move_away(layout, item, trash / str(number))
+            ]
     finally:
         remove(trash)
-    return tuple(done)
 
 
 def _move_away(layout: Layout, item: Item, target: Path) -> bool:

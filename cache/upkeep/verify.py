@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from semidense.cache.entries.check import inspect
+from semidense.cache.entries.check import inspect, read_plain
 from semidense.cache.errors import DamagedEntry, EntryNotFound
 from semidense.cache.files import THREADS, reading, walk
 from semidense.cache.store import Store
@@ -67,6 +67,7 @@ def verify(store: Store, keys: Iterable[str] | None = None, progress: Progress |
         InvalidKey: if one of ``keys`` is not a key.
         CacheUnavailable: if the file system refuses.
     """
+    store.layout.require_cache()
     wanted = sorted(set(store.layout.record_keys() if keys is None else keys))
     findings: dict[str, str | None] = {}
     with ThreadPoolExecutor(THREADS) as pool:
@@ -91,12 +92,11 @@ def _finding(store: Store, key: str, may_vanish: bool) -> str | None:
 
 def _quarantined(store: Store) -> dict[str, str]:
     """Return the reason of each thing in quarantine, by folder."""
-    folder, reasons = store.layout.quarantine, {}
-    with reading(folder):
-        for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-            reasons[path.name] = "unknown: its reason was never written"
-            with suppress(FileNotFoundError, NotADirectoryError):
-                reasons[path.name] = (path / "reason.txt").read_text(encoding="utf-8", errors="replace").strip()
+    reasons = {}
+    for path in store.layout.things(store.layout.quarantine):
+        reasons[path.name] = "unknown: its reason was never written"
+        with reading(path), suppress(FileNotFoundError, NotADirectoryError, DamagedEntry):
+            reasons[path.name] = read_plain(path / "reason.txt").decode("utf-8", "replace").strip()
     return reasons
 
 

@@ -4,22 +4,20 @@ import os
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from contextlib import nullcontext, suppress
 from typing import Any
 from uuid import uuid4
 
-from semidense.cache import Draft, Lease, Store
+from semidense.cache import CacheUnavailable, Lease, Store
 from semidense.pipeline.execution import tasks
 from semidense.pipeline.execution.claims import Claims, LocalClaims
-from semidense.pipeline.execution.tasks import Context
+from semidense.pipeline.execution.cluster import SETTLE_SECONDS, run_on_cluster
+from semidense.pipeline.execution.jobs import Context
+from semidense.pipeline.execution.proof import runner_code
 from semidense.pipeline.execution.tiles import cut_rows
 from semidense.pipeline.execution.watch import Unwatched, Watch
-from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made, Plan, Planned
 from semidense.pipeline.plan.steps import Step
-
-SETTLE_SECONDS = 0.3
-"""How long the write may take that a task is in when its run ends early and does not wait for it."""
 
 
 def execute(
@@ -49,11 +47,12 @@ def execute(
     store.sweep_drafts()
     if not plan.todo():
         return {planned.step.id: _there(planned) for planned in plan.steps}
-    lease = lease or Lease(store.root, None)
-    if scheduler:
-        return _on_cluster(plan, Context(store, Unwatched(), extras, Claims(lease)), watch, scheduler)
-    threads = workers or os.cpu_count() or 1
-    return _on_threads(plan, Context(store, watch, extras, LocalClaims(lease, store, threads)), threads)
+    with nullcontext(lease) if lease else store.lease() as held:
+        if scheduler:
+            context = Context(store, Unwatched(), extras, Claims(held), runner=runner_code())
+            return run_on_cluster(lambda: _graph(plan, context), held, watch, scheduler)
+        threads = workers or os.cpu_count() or 1
+        return _on_threads(plan, Context(store, watch, extras, LocalClaims(held, store, threads)), threads)
 
 
 def _there(planned: Planned) -> Made:
@@ -64,8 +63,7 @@ def _on_threads(plan: Plan, context: Context, threads: int) -> dict[str, Made]:
     import dask
     from dask.threaded import get
 
-    drafts = _Drafts(context.watch)
-    results, _ = _graph(plan, replace(context, watch=drafts))
+    results, lease = _graph(plan, context), context.claims.lease
     pool = ThreadPoolExecutor(threads)
     try:
         made: Sequence[Made] = dask.compute(*results, scheduler=get, pool=pool)  # by its name, distributed is loaded
@@ -77,69 +75,38 @@ def _on_threads(plan: Plan, context: Context, threads: int) -> dict[str, Made]:
     except BaseException:
         # A signal waits for nobody, but a write that is under way brings its folder back, once.
         context.claims.stop()
-        drafts.discard()
+        _discard(lease)
         time.sleep(SETTLE_SECONDS)
         raise
     finally:
         context.claims.stop()
-        drafts.discard()
+        _discard(lease)
         context.claims.close()
         pool.shutdown(wait=False, cancel_futures=True)
     return {each.step.id: each for each in made}
 
 
-def _on_cluster(plan: Plan, context: Context, watch: Watch, address: str) -> dict[str, Made]:
-    from distributed import Client, as_completed
-
-    try:
-        client = Client(address, timeout="10s", set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise UsageError(f"no Dask scheduler answers at {address}: {error}") from None
-    results, jobs = _graph(plan, context)
-    with client:
-        futures = client.compute([*results, *jobs])
-        begun = futures[len(results) :]
-        made = {}
-        try:
-            for future in as_completed(futures[: len(results)], loop=client.loop):
-                each: Made = future.result()
-                made[each.step.id] = each
-                if not each.reused:
-                    watch.published(each)
-        except BaseException:
-            _abandon(client, begun)
-            raise
-    return {planned.step.id: made[planned.step.id] for planned in plan.steps}
+def _discard(lease: Lease) -> None:
+    """Delete the drafts of a run, as far as that is possible."""
+    with suppress(CacheUnavailable):
+        lease.discard_drafts()
 
 
-def _abandon(client: Any, begun: Iterable[Any]) -> None:  # noqa: ANN401 - Dask's types carry no annotations
-    """Leave the cluster and delete the drafts of a run that ends early: the workers, who own them, may live on."""
-    drafts = [future.result().draft for future in begun if future.status == "finished"]
-    client.close()  # this releases what is still to be computed
-    for _ in range(2):  # a write that is under way brings its folder back, once
-        for draft in drafts:
-            if draft is not None:
-                draft.discard()
-        time.sleep(SETTLE_SECONDS)
-
-
-def _graph(plan: Plan, context: Context) -> tuple[list[Any], list[Any]]:
-    """Return one delayed ``Made`` a step, and one delayed ``Job`` a step that is not a hit."""
+def _graph(plan: Plan, context: Context) -> list[Any]:
+    """Return one delayed ``Made`` a step, in the order of the plan."""
     from dask import delayed
 
     results: dict[str, Any] = {}
-    jobs = []
     for planned in plan.steps:
         if planned.state == "hit":
             results[planned.step.id] = delayed(_there(planned), traverse=False)
         else:
-            results[planned.step.id], job = _delayed_step(planned.step, plan, context, results)
-            jobs.append(job)
-    return list(results.values()), jobs
+            results[planned.step.id] = _delayed_step(planned.step, plan, context, results)
+    return list(results.values())
 
 
-def _delayed_step(step: Step, plan: Plan, context: Context, results: Mapping[str, Any]) -> tuple[Any, Any]:
-    """Return a step's delayed ``Made``, and the delayed ``Job`` that it starts with."""
+def _delayed_step(step: Step, plan: Plan, context: Context, results: Mapping[str, Any]) -> Any:  # noqa: ANN401
+    """Return a step's delayed ``Made``."""
     from dask import delayed
 
     def task(function: Any, *arguments: Any) -> Any:  # noqa: ANN401
@@ -157,34 +124,7 @@ def _delayed_step(step: Step, plan: Plan, context: Context, results: Mapping[str
         ready = task(tasks.create_arrays, job)
         rows = cut_rows(step.size[0], step.stage.tile_rows)
         parts = [task(tasks.make_tile, shared, ready, delayed(each, traverse=False)) for each in rows]
-    return task(tasks.publish, shared, job, parts), job
-
-
-class _Drafts:
-    """A watch that also remembers which drafts are open, to delete them when the run ends early."""
-
-    def __init__(self, watch: Watch) -> None:
-        self._watch = watch
-        self._open: dict[str, Draft] = {}
-
-    def begun(self, step: Step, draft: Draft, tiles: int) -> None:
-        self._open[step.id] = draft
-        self._watch.begun(step, draft, tiles)
-
-    def waiting(self, step: Step, holder: str) -> None:
-        self._watch.waiting(step, holder)
-
-    def advanced(self, step: Step, done: int, total: int, note: str) -> None:
-        self._watch.advanced(step, done, total, note)
-
-    def published(self, made: Made) -> None:
-        self._open.pop(made.step.id, None)
-        self._watch.published(made)
-
-    def discard(self) -> None:
-        """Delete the drafts that were not published."""
-        for draft in list(self._open.values()):
-            draft.discard()
+    return task(tasks.publish, shared, job, parts)
 
 
 def totals(made: Iterable[Made]) -> dict[str, tuple[int, int]]:

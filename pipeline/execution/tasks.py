@@ -1,56 +1,35 @@
 """The tasks that Dask runs: begin a product, make its tiles, publish it.
 
 Between tasks travel keys and descriptions, never arrays: a task reads what it needs from the cache and
-writes what it makes into its draft, in whichever process it runs.
+writes what it makes into its draft, in whichever process it runs. Each can be run again at any time, by
+another worker too: it finds the draft that was begun, the tile that was written, the product that was published.
 """
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
-from semidense.cache import DamagedEntry, Draft, Entry, EntryNotFound, Recipe, Store
+from semidense.cache import (
+    DamagedEntry,
+    Draft,
+    Entry,
+    EntryNotFound,
+    IncompleteDraft,
+    Recipe,
+    Store,
+    require_imported_as_hashed,
+)
 from semidense.pipeline.execution.checkpoints import Checkpoints
-from semidense.pipeline.execution.claims import Claims
-from semidense.pipeline.execution.recent_inputs import Recent
+from semidense.pipeline.execution.jobs import Context, Job, Span, explained
 from semidense.pipeline.execution.tiles import Rows, read_block, trim
-from semidense.pipeline.execution.watch import Watch
-from semidense.pipeline.plan.environment import version
-from semidense.pipeline.plan.errors import DISK_ERRNOS, USER_ERRORS, StageFailed, StageRefused
+from semidense.pipeline.plan.environment import cpu_name, version
+from semidense.pipeline.plan.errors import StageFailed
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.steps import Step
 from semidense.stages.stage import Array, Arrays, Output
 
 VERSIONS = ("semidense-stereo", "dask", "numpy", "torch", "xarray", "zarr")
-
-
-@dataclass(frozen=True)
-class Context:
-    """What every task is given: cache, watch, what is stored beside results, who makes what, what was read last."""
-
-    store: Store
-    watch: Watch
-    extras: Mapping[str, Any]
-    claims: Claims
-    recent: Recent = field(default_factory=Recent)
-
-
-@dataclass(frozen=True)
-class Job:
-    """A product in the making.
-
-    Attributes:
-        step: what is made.
-        inputs: keys of the entries it is made from, by product.
-        draft: where it is written; None if an equal result was there already.
-        made: the result that was there already, else None.
-    """
-
-    step: Step
-    inputs: Mapping[str, tuple[str, ...]]
-    draft: Draft | None
-    made: Made | None
 
 
 def begin(context: Context, step: Step, inputs: Sequence[Made], forced: bool, tiles: int) -> Job:
@@ -59,7 +38,8 @@ def begin(context: Context, step: Step, inputs: Sequence[Made], forced: bool, ti
     recipe = step.recipe({step_id: made.digest for step_id, made in by_id.items()})
     keys = {product: tuple(by_id[each].key for each in ids) for product, ids in step.inputs.items()}
     with explained(step):
-        if not forced and (made := _find(context.store, step, recipe)):
+        context.admit(step)
+        if not forced and (made := _find(context, step, recipe)):
             context.claims.lease.add([recipe.key])
             return Job(step, keys, None, made)
         context.claims.take(recipe.key, lambda holder: context.watch.waiting(step, holder))
@@ -74,22 +54,24 @@ def _begin_claimed(
     context: Context, step: Step, recipe: Recipe, keys: Mapping[str, tuple[str, ...]], forced: bool, tiles: int
 ) -> Job:
     """Look again, now that nobody else makes the product, and begin a draft."""
-    if not forced and (made := _find(context.store, step, recipe)):
+    if not forced and (made := _find(context, step, recipe)):
         context.claims.release(recipe.key)
         return Job(step, keys, None, made)
     _set_damaged_aside(context.store, recipe.key)
     with context.claims.opening():
-        draft = context.store.begin(recipe, step.label)
+        draft = context.store.begin(recipe, step.label, context.claims.lease, step.id)
         context.watch.begun(step, draft, tiles)
     return Job(step, keys, draft, None)
 
 
-def _find(store: Store, step: Step, recipe: Recipe) -> Made | None:
-    """Return a step's result if it is there and sound."""
+def _find(context: Context, step: Step, recipe: Recipe) -> Made | None:
+    """Return a step's result if it is there and sound; this very run may have made it."""
+    store, run = context.store, context.claims.lease.name
     if store.find(recipe.key) is None or store.check(recipe.key) is not None:
         return None
     try:
-        return _made(step, store.require(recipe.key), reused=True)
+        entry = store.require(recipe.key)
+        return Made(step, entry.key, entry.digest, entry.seconds, reused=run is None or entry.extras.get("run") != run)
     except (EntryNotFound, DamagedEntry):  # it went between two looks
         return None
 
@@ -101,23 +83,48 @@ def _set_damaged_aside(store: Store, key: str) -> None:
             store.require(key)
 
 
-def make_tile(context: Context, job: Job, rows: Rows) -> None:
-    """Compute one tile of a product and write it into the draft."""
+def make_tile(context: Context, job: Job, rows: Rows) -> Span | None:
+    """Compute one tile of a product and write it into the draft; return when, None if that was done before."""
     if job.draft is None:
-        return
-    step = job.step
+        return None
+    begun, step = time.time(), job.step
     with explained(step, str(rows)):
-        inputs = {
-            product: read_block(context.store.arrays(keys[0]), rows, step.stage, step.params)
-            for product, keys in job.inputs.items()
-        }
-        made = step.stage.function()(step.argument, inputs)
-        if step.stage.border == "cut":
-            dims = {output.name: output.dims for output in step.stage.outputs}
-            made = trim(made, dims, rows, step.stage.halo(step.params))
+        context.admit(step)
+        if job.draft.published() or _holds_tile(job.draft, step.stage.outputs, rows):
+            return None
+        made = _compute_tile(context, job, rows)
         for output in step.stage.outputs:
             _write_tile(job.draft, output, made[output.name], rows)
     context.watch.advanced(step, 1, len_tiles(step), "")
+    return begun, time.time()
+
+
+def _compute_tile(context: Context, job: Job, rows: Rows) -> Arrays:
+    """Return a tile's own rows of a product."""
+    step = job.step
+    inputs = {
+        product: read_block(context.store.arrays(keys[0]), rows, step.stage, step.params)
+        for product, keys in job.inputs.items()
+    }
+    made = _call(step, inputs)
+    if step.stage.border != "cut":
+        return made
+    dims = {output.name: output.dims for output in step.stage.outputs}
+    return trim(made, dims, rows, step.stage.halo(step.params))
+
+
+def _call(step: Step, *arguments: object) -> Arrays:
+    """Call a stage's function, and see that what it imported is what the step's key names."""
+    function = step.stage.function()
+    require_imported_as_hashed(step.code)
+    made = function(step.argument, *arguments)
+    require_imported_as_hashed(step.code)  # it may have imported more
+    return made
+
+
+def _holds_tile(draft: Draft, outputs: Iterable[Output], rows: Rows) -> bool:
+    """Return whether another worker wrote this tile."""
+    return all(draft.holds(output.name, _region(output, rows)) for output in outputs if _has_part(output, rows))
 
 
 def len_tiles(step: Step) -> int:
@@ -134,25 +141,31 @@ def create_arrays(job: Job) -> Job:
     stage, params = job.step.stage, job.step.params
     sizes = {"y": job.step.size[0], "x": job.step.size[1], **stage.sizes(params)}
     with explained(job.step):
+        if job.draft.published():
+            return job
         for output in stage.outputs:
             shape = [sizes[dim] for dim in output.dims]
             _create(job.draft, output, shape, str(output.dtype), stage.tile_rows)
     return job
 
 
-def make_whole(context: Context, job: Job) -> None:
-    """Compute a product that is not tiled and write it into the draft."""
+def make_whole(context: Context, job: Job) -> Span | None:
+    """Compute a product that is not tiled and write it into the draft; return when, None if that was done before."""
     if job.draft is None:
-        return
-    step = job.step
+        return None
+    begun, step = time.time(), job.step
     with explained(step):
+        context.admit(step)
+        if job.draft.published() or all(job.draft.holds(output.name) for output in step.stage.outputs):
+            return None
         inputs = {product: _read_whole(context, step, product, keys) for product, keys in job.inputs.items()}
-        made = step.stage.function()(step.argument, inputs, *_monitor(context, job.draft, step))
+        made = _call(step, inputs, *_monitor(context, job.draft, step))
         for output in step.stage.outputs:
             array = made[output.name].astype(output.dtype or made[output.name].dtype, copy=False)
             _create(job.draft, output, array.shape, str(array.dtype), None)
             job.draft.write(output.name, tuple(slice(0, length) for length in array.shape), array)
     context.watch.advanced(step, 1, 1, "")
+    return begun, time.time()
 
 
 def _monitor(context: Context, draft: Draft, step: Step) -> tuple[Checkpoints, ...]:
@@ -164,32 +177,59 @@ def _monitor(context: Context, draft: Draft, step: Step) -> tuple[Checkpoints, .
     return (Checkpoints(context.store.root, draft.recipe.key, report),) if step.stage.monitored else ()
 
 
-def publish(context: Context, job: Job, _: Sequence[None]) -> Made:
+def publish(context: Context, job: Job, spans: Sequence[Span | None]) -> Made:
     """Publish a product all of whose tiles are written."""
     if job.draft is None:
         if job.made is None:
             raise StageFailed(f"{job.step.name}: a job without draft and result")
         made = job.made
     else:
+        seconds = covered(span for span in spans if span)
         with explained(job.step):
             try:
-                entry = job.draft.publish(time.time() - job.draft.started, context.extras)
+                context.admit(job.step)
+                entry = _publish(job.draft, seconds, _extras(context, job.step))
                 Checkpoints(context.store.root, entry.key).remove()
             finally:
                 context.claims.release(job.draft.recipe.key)
-        made = _made(job.step, entry, reused=False)
+        made = Made(job.step, entry.key, entry.digest, seconds, reused=False)
     context.watch.published(made)
     return made
 
 
-def provenance(command: Sequence[str], configuration: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is stored beside every result: versions, the command line, the whole configuration."""
-    versions = {name: version(name) for name in VERSIONS}
-    return {"versions": versions, "command": list(command), "configuration": configuration}
+def _publish(draft: Draft, seconds: float, extras: Mapping[str, Any]) -> Entry:
+    """Publish a draft, or find what it became: its publisher may have been killed at any point."""
+    try:
+        return draft.published() or draft.publish(seconds, extras)
+    except IncompleteDraft:
+        # A writer that was given up brought a part of the folder back, after the draft was published.
+        if entry := draft.published():
+            return entry
+        raise
 
 
-def _made(step: Step, entry: Entry, reused: bool) -> Made:
-    return Made(step, entry.key, entry.digest, entry.seconds, reused)
+def _extras(context: Context, step: Step) -> dict[str, Any]:
+    """Return what is stored beside a result: what the run gives to all, and what belongs to this one."""
+    own: dict[str, Any] = {"cpu": cpu_name(), "configuration": step.configuration}
+    return {**context.extras, **own, **({"run": run} if (run := context.claims.lease.name) else {})}
+
+
+def covered(spans: Iterable[Span]) -> float:
+    """Return for how many seconds at least one of some spans lasted.
+
+    >>> covered([(0.0, 2.0), (1.0, 3.0), (5.0, 6.0)])
+    4.0
+    """
+    total, end = 0.0, float("-inf")
+    for first, last in sorted(spans):
+        total += max(0.0, last - max(first, end))
+        end = max(end, last)
+    return total
+
+
+def provenance(command: Sequence[str]) -> dict[str, Any]:
+    """Return what is stored beside every result of a run: versions and the command line."""
+    return {"versions": {name: version(name) for name in VERSIONS}, "command": list(command)}
 
 
 def _read_whole(context: Context, step: Step, product: str, keys: Sequence[str]) -> Arrays | Sequence[Arrays]:
@@ -199,7 +239,9 @@ def _read_whole(context: Context, step: Step, product: str, keys: Sequence[str])
 
 
 def _create(draft: Draft, output: Output, shape: Sequence[int], dtype: str, tile_rows: int | None) -> None:
-    """Create one array, chunked so that a tile writes whole chunks."""
+    """Create one array, chunked so that a tile writes whole chunks, unless it is there."""
+    if draft.has_array(output.name):
+        return
     chunks = [
         tile_rows if dim == "y" and tile_rows else output.chunks.get(dim, length)
         for dim, length in zip(output.dims, shape, strict=True)
@@ -209,25 +251,15 @@ def _create(draft: Draft, output: Output, shape: Sequence[int], dtype: str, tile
 
 
 def _write_tile(draft: Draft, output: Output, array: Array, rows: Rows) -> None:
-    """Write a tile's part of one array; what has no rows is written by the first tile alone."""
-    if "y" not in output.dims and rows.start > 0:
-        return
-    region = tuple(
-        slice(rows.start, rows.stop) if dim == "y" else slice(0, length)
-        for dim, length in zip(output.dims, array.shape, strict=True)
-    )
-    draft.write(output.name, region, array.astype(output.dtype, copy=False))
+    """Write a tile's part of one array."""
+    if _has_part(output, rows):
+        draft.write(output.name, _region(output, rows), array.astype(output.dtype, copy=False))
 
 
-@contextmanager
-def explained(step: Step, where: str = "") -> Iterator[None]:
-    """Name product, scene and tile in whatever goes wrong."""
-    try:
-        yield
-    except (StageFailed, StageRefused):
-        raise
-    except Exception as error:
-        place = f"{step.name}, {where}" if where else step.name
-        message = f"{place}: {error}" if str(error) else f"{place}: {type(error).__name__}"
-        disk = isinstance(error, OSError) and error.errno in DISK_ERRNOS
-        raise (StageRefused if disk or isinstance(error, USER_ERRORS) else StageFailed)(message) from error
+def _has_part(output: Output, rows: Rows) -> bool:
+    """Return whether a tile writes a part of an array: what has no rows is written by the first tile alone."""
+    return "y" in output.dims or rows.start == 0
+
+
+def _region(output: Output, rows: Rows) -> tuple[slice, ...]:
+    return tuple(slice(rows.start, rows.stop) if dim == "y" else slice(None) for dim in output.dims)

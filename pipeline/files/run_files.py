@@ -130,7 +130,7 @@ class _Exporter:
     def write_config(self) -> None:
         """Write the command, the versions, and the settings that each result was made with."""
         targets = [self._described(*target) for target in self.result.plan.targets]
-        document = provenance(sys.argv, {}) | {"configuration": targets}
+        document = provenance(sys.argv) | {"configuration": targets}
         self._write(self.folder / "config.json", (json.dumps(document, indent=2) + "\n").encode())
 
     def _described(self, step_id: str, variant: str) -> dict[str, Any]:

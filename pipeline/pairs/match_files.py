@@ -238,4 +238,4 @@ def summary(match: Match) -> dict[str, Any]:
         "reused": [each.step.product for each in steps if each.reused],
         "settings": {each.step.product: dict(each.step.settings) for each in steps},
         "keys": {each.step.product: each.key for each in steps},
-    } | {name: value for name, value in provenance(sys.argv, {}).items() if name != "configuration"}
+    } | provenance(sys.argv)

@@ -1,15 +1,19 @@
-"""What changes a result's bits besides code, settings and inputs: the versions of packages."""
+"""What changes a result's bits besides code, settings and inputs: the versions of packages, and the kind of CPU."""
 
+import platform
 from functools import cache
 from importlib import metadata
 
 from semidense.cache import Entry
 from semidense.cache.keys.code import source_text
 from semidense.pipeline.plan.errors import UsageError
+from semidense.stages.compute.precision import cpu_facts, cpu_flags
 from semidense.stages.stage import Stage
 
 FORMER = ("pipeline", "stages", "datasets", "cache")
 """Top-level packages of this distribution up to version 0.1."""
+_INSTRUCTIONS = ("avx2", "fma", "avx512f", "avx512_vnni", "avx512_bf16", "amx_bf16", "asimd", "sve", "bf16")
+"""Of what a CPU can do, what makes torch, its libraries and NumPy take other instructions, and round otherwise."""
 
 
 @cache
@@ -18,13 +22,37 @@ def version(distribution: str) -> str:
     return metadata.version(distribution)
 
 
+@cache
+def cpu_kind() -> str:
+    """Return what of this machine's CPU decides how results are rounded: its family, maker and instructions."""
+    known = [name for name in _INSTRUCTIONS if name in cpu_flags()]
+    return " ".join(
+        [platform.machine() or "unknown", *([maker] if (maker := cpu_facts().get("vendor_id")) else []), *known]
+    )
+
+
+@cache
+def cpu_name() -> str:
+    """Return the name of this machine's CPU for people, and its kind."""
+    name = cpu_facts().get("model name")
+    return f"{name} ({cpu_kind()})" if name else cpu_kind()
+
+
 def environment(stage: Stage) -> dict[str, str]:
-    """Return major versions of the core packages, the format of the arrays, and the versions of what a stage needs.
+    """Return what beside code, settings and inputs may change the results of a stage.
+
+    Major versions of the core packages, the format of the arrays, the versions of what the stage needs, and the kind
+    of CPU: results of one kind are the same to the bit, those of two kinds may differ by rounding.
 
     Raises:
         UsageError: if a package that the stage needs is not installed.
     """
-    core = {"torch": version("torch").split(".")[0], "numpy": version("numpy").split(".")[0], "zarr_format": "3"}
+    core = {
+        "torch": version("torch").split(".")[0],
+        "numpy": version("numpy").split(".")[0],
+        "zarr_format": "3",
+        "cpu": cpu_kind(),
+    }
     if missing := missing_packages(stage):
         raise UsageError(
             f"{stage.product} needs {' and '.join(missing)}: pip install 'semidense-stereo[baselines]' brings it"

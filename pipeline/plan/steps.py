@@ -8,6 +8,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +61,7 @@ class Step:
         code: hash of every module that decides the result.
         environment: what else changes its bits.
         R: the confidence threshold that a product below ``semidense`` was made with.
+        configuration: all settings of the first variant that needs it, with its own as they were resolved.
     """
 
     id: str
@@ -73,6 +75,7 @@ class Step:
     code: Mapping[str, str]
     environment: Mapping[str, str]
     R: float | None = None
+    configuration: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return product and scene."""
@@ -317,6 +320,15 @@ class _Builder:
         settings = params.model_dump(mode="json") | {"tiles": stage.tiling(params)}
         return self._add(stage, scene, params, settings, inputs)
 
+    @cached_property
+    def _settings(self) -> dict[str, Any]:
+        return self.config.to_dict()
+
+    def _configuration(self, product: str, argument: object) -> dict[str, Any]:
+        """Return all settings, a step's own as they were resolved for it."""
+        own = {product: argument.model_dump(mode="json")} if isinstance(argument, Params) else {}
+        return {**self._settings, **(own if product in self._settings else {})}
+
     def _add(
         self,
         stage: Stage,
@@ -341,14 +353,15 @@ class _Builder:
                 settings=dict(settings),
                 inputs=dict(inputs),
                 size=size,
-                code=_code(stage.module, *modules),
+                code=code_of(stage.module, *modules),
                 environment=environment(stage),
                 R=semidense.R if filtered else None,
+                configuration=self._configuration(stage.product, argument),
             )
         return step_id
 
 
-def _code(*modules: str) -> dict[str, str]:
+def code_of(*modules: str) -> dict[str, str]:
     """Return the hashes of modules and of all that they import from this package or their own."""
     packages = ("semidense", *(module.partition(".")[0] for module in modules))
     return {name: part for module in modules for name, part in code_parts(module, tuple(sorted({*packages}))).items()}

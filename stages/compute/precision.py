@@ -16,12 +16,19 @@ _CPUINFO = Path("/proc/cpuinfo")
 
 
 @cache
+def cpu_facts() -> dict[str, str]:
+    """Return what Linux says of this machine's first CPU, by field; nothing where it does not say."""
+    if not _CPUINFO.exists():
+        return {}
+    lines = (line.partition(":") for line in reversed(_CPUINFO.read_text().splitlines()))
+    return {name.strip(): value.strip() for name, _, value in lines}
+
+
+@cache
 def cpu_flags() -> frozenset[str]:
     """Return what Linux says that this CPU can do; nothing where it does not say."""
-    if not _CPUINFO.exists():
-        return frozenset()
-    lines = _CPUINFO.read_text().splitlines()
-    return frozenset(flag for line in lines if line.startswith("flags") for flag in line.split())
+    facts = cpu_facts()
+    return frozenset((facts.get("flags") or facts.get("Features", "")).split())
 
 
 def fast_bfloat16(*, transformed: bool = False) -> bool:

@@ -108,7 +108,8 @@ def run_script() -> Callable[..., str]:
     def run(code: str, *arguments: object, root: bool = True) -> str:
         prelude = PRELUDE if root else WITHOUT_ROOT + PRELUDE
         command = [sys.executable, "-c", prelude + code, *map(str, arguments)]
-        environment = {**os.environ, "PYTHONPATH": str(PROJECT)}
+        path = os.pathsep.join([str(PROJECT), os.environ.get("PYTHONPATH", "")])
+        environment = {**os.environ, "PYTHONPATH": path}
         done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60, check=False)
         assert done.returncode == 0, done.stderr
         return done.stdout

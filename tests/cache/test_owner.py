@@ -1,30 +1,13 @@
 import os
-import subprocess
-import sys
 
-from semidense.cache.owner import is_abandoned, owner
+from semidense.cache.owner import describe, owner
 
 
-def test_own_things_are_not_abandoned() -> None:
-    assert not is_abandoned(f"{owner()}-00ff")
-    assert not is_abandoned(f"{owner()}-00ff.json")
-
-
-def test_a_process_that_ended_has_abandoned_its_things() -> None:
-    with subprocess.Popen([sys.executable, "-c", ""]) as process:
-        pass
-    host = owner().split("-")[0]
-    assert is_abandoned(f"{host}-{process.pid}-0-00ff")
-
-
-def test_a_used_again_process_id_does_not_protect() -> None:
-    host, pid, start = owner().split("-")
+def test_the_owner_of_a_lock_is_told_in_words() -> None:
+    host, pid = owner().rsplit("-", 1)
     assert int(pid) == os.getpid()
-    assert is_abandoned(f"{host}-{pid}-{int(start) + 1}-00ff")
+    assert describe(owner()) == f"process {pid} on {host}"
 
 
-def test_other_hosts_and_other_names_are_left_alone() -> None:
-    host, pid, start = owner().split("-")
-    assert not is_abandoned(f"not{host}-{pid}-{int(start) + 1}-00ff")
-    assert not is_abandoned("notes.txt")
-    assert is_abandoned(f"{host}-{'9' * 30}-0-00ff")
+def test_other_texts_name_nobody() -> None:
+    assert [describe(text) for text in ("", "notes", "host-x", "a b-1", "host-1-2")] == [None] * 5

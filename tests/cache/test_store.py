@@ -248,3 +248,69 @@ print((root / "cache").exists())
     lines = printed.splitlines()
     assert "is missing" in lines[0]
     assert lines[1:] == ["True None", "1 0", "False"]
+
+
+def test_a_folder_of_somebody_s_files_is_refused_and_stays(
+    tmp_path: Path, make: Callable[..., Entry], recipe: Recipe
+) -> None:
+    home = tmp_path / "home"
+    (home / "locks").mkdir(parents=True)
+    (home / "locks" / "key.pem").write_text("kept")
+    for work in (make, lambda store: store.claim(recipe.key), Store.sweep_drafts, Store.entries):
+        with pytest.raises(CacheUnavailable, match=rf"^{home} is not a cache: it holds 'locks' but no CACHEDIR.TAG"):
+            work(Store(home))
+    assert (home / "locks" / "key.pem").read_text() == "kept"
+    assert [path.name for path in home.iterdir()] == ["locks"]
+
+
+def test_an_empty_folder_and_a_link_to_one_become_caches(tmp_path: Path, make: Callable[..., Entry]) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "empty")
+    entry = make(Store(tmp_path / "link"))
+    assert Store(tmp_path / "empty").require(entry.key) == entry
+
+
+def test_a_tag_that_a_full_disk_cut_short_is_written_again(store: Store, make: Callable[..., Entry]) -> None:
+    store.root.mkdir()
+    (store.root / "CACHEDIR.TAG").write_text("Signature")
+    make(store)
+    assert (store.root / "CACHEDIR.TAG").read_text().count("\n") == 2
+    assert [path.name for path in store.root.glob("CACHEDIR*")] == ["CACHEDIR.TAG"]
+
+
+@pytest.mark.parametrize("url", ["s3://bucket/x", "gs://bucket", "https://example.org/cache", "file:///tmp/x"])
+def test_a_url_is_refused_in_one_line(url: str) -> None:
+    for root in (url, Path(url)):
+        with pytest.raises(CacheUnavailable, match=r"^[a-z0-9]+:/[^\n]+ is a URL, and a cache is a folder[^\n]+$"):
+            Store(root)  # type: ignore[arg-type]
+
+
+def test_every_look_at_opened_files_goes_through_the_manifest(
+    store: Store, make: Callable[..., Entry], recipe: Recipe
+) -> None:
+    import asyncio
+
+    from zarr.abc.store import RangeByteRequest
+    from zarr.core.buffer import default_buffer_prototype
+
+    make(store)
+    group = store.arrays(recipe.key)["map"].store
+    folder = store.layout.entry(recipe.key) / "data.zarr"
+    (folder / "map").chmod(0o755)
+    (folder / "map" / "stray").write_bytes(b"x")
+    (folder / "map/c/1").chmod(0o755)
+    (folder / "map/c/1/0").unlink()
+
+    async def look() -> None:
+        part = RangeByteRequest(0, 4)
+        assert not await group.exists("map/stray")
+        assert await group.exists("map/c/1/0")
+        assert [name async for name in group.list_dir("map")] == ["c", "zarr.json"]
+        assert "map/stray" not in [key async for key in group.list()]
+        assert [key async for key in group.list_prefix("map/c/1")] == ["map/c/1/0"]
+        assert await group.getsize("map/c/1/0") > 0
+        assert await group.get_partial_values(default_buffer_prototype(), [("map/stray", part)]) == [None]
+        with pytest.raises(DamagedEntry, match="changed or vanished"):
+            await group.get_partial_values(default_buffer_prototype(), [("map/c/1/0", part)])
+
+    asyncio.run(look())

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tests.faults import inputs, keys, machine, processes, storage
+from tests.faults import inputs, keys, machine, processes, storage, workers
 from tests.faults.tally import Tally
 
 PROMISED = 5000
@@ -41,6 +41,8 @@ ROWS = (
     Row(10, "random sequences of run, sweep, damage, kill, gc, verify", machine.random_sequences, 0.05),
     Row(11, "bad images", inputs.bad_images, 0.1),
     Row(12, "bad maps, calibrations, configurations, weights, archives", inputs.bad_files, 0.1),
+    Row(13, "workers with other code than the run", workers.other_code, 0.2),
+    Row(16, "workers and schedulers killed during a run on a cluster", workers.killed_workers, 0.05),
 )
 COLUMNS = ("injected", "wrong", "lost", "leftovers", "tracebacks")
 HEADINGS = ("faults", "wrong results", "lost products", "leftovers", "tracebacks")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from semidense.cache import Store
+from semidense.cache import Store, code_parts
 from semidense.pipeline import api
 from semidense.pipeline.api import Task
 from semidense.pipeline.execution.scheduler import execute
@@ -62,7 +62,9 @@ def test_the_command_line_finds_the_scheduler(scheduler: str, invoke: Callable[.
 def run(graph: Graph, store: Store, scheduler: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, Made]:
     from semidense.pipeline.plan import plan as planning
 
-    monkeypatch.setattr(planning, "build", lambda _: graph)
+    code = code_parts("tests.pipeline.toy", ("tests",))
+    proven = Graph({each.id: replace(each, code=code) for each in graph.steps.values()}, graph.targets)
+    monkeypatch.setattr(planning, "build", lambda _: proven)
     request: Any = None
     return execute(planning.make_plan(request, store), store, Unwatched(), {}, scheduler)
 

@@ -168,7 +168,7 @@ def _confidence(found: Gathered) -> Html:
 
 def _configuration(found: Gathered) -> Html:
     config = next(iter(found.task.request("metrics").configs.values())).to_dict()
-    about = provenance([], {})["versions"]
+    about = provenance([])["versions"]
     versions = table(["package", "version"], [list(pair) for pair in about.items()], caption="Versions", words=2)
     every = [[f"{part}.{name}", json.dumps(value)] for part, fields in config.items() for name, value in fields.items()]
     settings = table(["setting", "value"], every, caption="The configuration; null is found by itself", words=2)

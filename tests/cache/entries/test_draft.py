@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from semidense.cache import CacheUnavailable, Draft, Entry, IncompleteDraft, InvalidArray, InvalidRecipe, Recipe, Store
+from semidense.cache.entries import publish
 from semidense.cache.files import walk
 
 
@@ -152,6 +153,89 @@ def test_leftovers_of_killed_writers_are_not_published(store: Store, draft: Draf
     key = draft.publish(0, {}).key
     assert store.check(key) is None
     assert not [path for path, _ in walk(store.layout.entry(key)) if "partial" in path or "half" in path]
+
+
+def test_what_another_process_of_the_run_wrote_is_found_again(
+    store: Store, recipe: Recipe, filled: Callable[..., None]
+) -> None:
+    with store.lease() as lease:
+        first = store.begin(recipe, {}, lease)
+        first.create_array("map", (3, 3), "float32", (2, 3), ("y", "x"), {})
+        upper, lower = (slice(0, 2), slice(0, 3)), (slice(2, 3), slice(0, 3))
+        first.write("map", upper, np.zeros((2, 3), np.float32))
+        again = store.begin(recipe, {}, lease)
+        assert again.path == first.path
+        assert (again.has_array("map"), again.has_array("other"), again.has_array("../map")) == (True, False, False)
+        assert [again.holds("map", region) for region in (upper, lower, None)] == [True, False, False]
+        assert not again.holds("other")
+        assert again.published() is None
+        again.write("map", lower, np.zeros((1, 3), np.float32))
+        assert first.holds("map")
+        entry = again.publish(1, {})
+        assert first.published() == entry
+        assert not first.holds("map")
+
+
+def test_runs_do_not_share_drafts(store: Store, recipe: Recipe) -> None:
+    with store.lease() as one, store.lease() as other:
+        paths = {store.begin(recipe, {}, lease).path for lease in (one, one, other, None, None)}
+        assert len(paths) == 4
+        one.discard_drafts()
+        assert sum(path.exists() for path in paths) == 3
+
+
+@pytest.mark.parametrize("step", publish.STEPS[3:])
+def test_a_run_whose_publisher_was_killed_publishes_all_the_same(
+    store: Store, recipe: Recipe, filled: Callable[..., None], run_script: Callable[..., str], step: str
+) -> None:
+    """Another process goes on where the first was killed, at whichever step; nothing is made again."""
+    with store.lease() as lease:
+        draft = store.begin(recipe, {}, lease)
+        filled(draft)
+        run_script(
+            """
+from semidense.cache import Lease
+def work():
+    root, path, step = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
+    publish.STEP_HOOK = lambda done: die() if done == step else None
+    Store(root).begin(recipe, {}, Lease(root, path)).publish(1, {})
+assert code(in_child(work)) == -signal.SIGKILL
+""",
+            store.root,
+            lease.path,
+            step,
+        )
+        entry = draft.published() or draft.publish(2, {})
+        assert (store.check(recipe.key), store.require(recipe.key)) == (None, entry)
+        assert draft.published() == entry
+        lease.discard_drafts()
+        assert list(store.layout.drafts.iterdir()) == []
+
+
+def test_renamed_data_are_published_only_if_they_are_what_the_record_beside_the_draft_says(
+    store: Store, recipe: Recipe, filled: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Killed(BaseException):
+        pass
+
+    def kill(step: str) -> None:
+        if step == "renamed":
+            raise Killed
+
+    monkeypatch.setattr(publish, "discard", lambda draft: None)
+    monkeypatch.setattr(publish, "STEP_HOOK", kill)
+    draft = store.begin(recipe, {})
+    filled(draft)
+    with pytest.raises(Killed):
+        draft.publish(1, {})
+    chunk = store.layout.entry(recipe.key) / "data.zarr/map/c/1/0"
+    chunk.chmod(0o600)
+    good = chunk.read_bytes()
+    chunk.write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
+    assert draft.published() is None
+    assert store.find(recipe.key) is None
+    chunk.write_bytes(good)
+    assert draft.published() == store.require(recipe.key)
 
 
 def test_the_block_publishes_at_its_end(store: Store, recipe: Recipe, filled: Callable[..., None]) -> None:

@@ -141,6 +141,7 @@ def test_data_without_a_record_are_replaced(
     store: Store, make: Callable[..., Entry], recipe: Recipe, kind: str, tmp_path: Path, values: np.ndarray
 ) -> None:
     target, outside = store.layout.entry(recipe.key), tmp_path / "outside"
+    store.layout.create()
     target.parent.mkdir(parents=True)
     outside.mkdir()
     (outside / "kept").write_text("kept")

@@ -1,4 +1,5 @@
 import itertools
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -227,3 +228,59 @@ def test_refuses(tree: Tree, files: dict[str, str], module: str) -> None:
     package = tree(files)
     with pytest.raises(SourceNotFound, match=r"^[^\n]+$"):
         code_hash(module.replace("PKG", package), (package,))
+
+
+EDITING = """
+import sys, time
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+module = Path(sys.argv[1]) / "edited" / "stage.py"
+from semidense.cache.errors import EditedSource
+from semidense.cache.keys.code import code_parts, require_imported_as_hashed
+
+def edit():
+    time.sleep(0.1)
+    module.write_text("x = 2\\n")
+
+def hashes():
+    return code_parts("edited.stage", ("edited",))
+
+def look():
+    require_imported_as_hashed(["edited.stage", "not.imported"])
+
+for act in sys.argv[2].split():
+    if act == "import":
+        import edited.stage
+    else:
+        try:
+            {"edit": edit, "hash": hashes, "look": look}[act]()
+        except EditedSource as error:
+            print("refused", error)
+print("end")
+"""
+
+
+@pytest.mark.parametrize(
+    ("acts", "refused"),
+    [
+        pytest.param("import hash look", 0, id="nothing is edited"),
+        pytest.param("import edit hash", 1, id="old code would run under the new text's key"),
+        pytest.param("import edit hash hash", 2, id="and again"),
+        pytest.param("hash edit import look", 1, id="new code would run under the old text's key"),
+        pytest.param("edit hash import look", 0, id="edited before both"),
+        pytest.param("import hash edit hash look", 0, id="what runs is what was hashed"),
+        pytest.param("hash import look edit look", 0, id="known to be the same by then"),
+        pytest.param("hash edit look", 0, id="never imported"),
+    ],
+)
+def test_what_runs_is_what_was_hashed(tmp_path: Path, acts: str, refused: int) -> None:
+    (tmp_path / "edited").mkdir()
+    (tmp_path / "edited" / "__init__.py").write_text("")
+    (tmp_path / "edited" / "stage.py").write_text("x = 1\n")
+    done = subprocess.run([sys.executable, "-c", EDITING, str(tmp_path), acts], capture_output=True, text=True)
+    *said, last = done.stdout.splitlines()
+    assert (last, done.stderr) == ("end", "")
+    assert len(said) == refused
+    for line in said:
+        assert line.startswith(f"refused {tmp_path / 'edited' / 'stage.py'} was edited since this Python began")
+        assert line.endswith("restart Python (the kernel)")

@@ -5,14 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from semidense.cache import Entry, Recipe, Store
+from semidense.cache import CacheUnavailable, Entry, Recipe, Store
 from semidense.cache.files import walk
-from semidense.cache.owner import owner
-from semidense.cache.upkeep.gc import FOREIGN_SECONDS, Limits, collect, survey
+from semidense.cache.upkeep.gc import Limits, collect, survey
 from tests.faults.damage import DAMAGE, unlock
 
 Make = Callable[..., Entry]
-DEAD = f"{owner().rsplit('-', 2)[0]}-4194303-1-00ab"
+LEASE = "0f" * 16
+DEAD = f"{LEASE}-{'ab' * 32}"
+"""A draft whose lease nobody holds."""
 
 
 def names(store: Store, limits: Limits) -> dict[str, str]:
@@ -100,9 +101,9 @@ def test_what_is_used_since_the_survey_stays(store: Store, make: Make) -> None:
         ("damaged record", lambda store, entry: damage(store, entry, "truncated record")),
         ("damaged record", lambda store, entry: damage(store, entry, "record is a pipe")),
         ("damaged record", lambda store, entry: damage(store, entry, "record is a folder")),
-        ("quarantine", lambda store, entry: (store.layout.quarantine / "x").mkdir()),
-        ("stale lock", lambda store, entry: (store.layout.locks / "x").touch()),
-        ("stale lock", lambda store, entry: (store.layout.leases / DEAD).touch()),
+        ("quarantine", lambda store, entry: (store.layout.quarantine / f"{'ab' * 32}-00ff00ff").mkdir()),
+        ("stale lock", lambda store, entry: (store.layout.locks / f"{'ab' * 32}.making").touch()),
+        ("stale lock", lambda store, entry: (store.layout.leases / LEASE).touch()),
         ("checkpoint", lambda store, entry: checkpoint(store, f".{'ab' * 32}.1.2.tmp")),
         ("checkpoint", lambda store, entry: checkpoint(store, entry.key)),
     ],
@@ -134,14 +135,46 @@ def test_what_a_newer_program_wrote_stays(store: Store, make: Make) -> None:
     assert names(store, Limits(seconds=-1)) == {}
 
 
-def test_drafts_of_others_stay_for_a_week(store: Store, recipe: Recipe) -> None:
-    store.begin(recipe, {})
-    foreign = store.layout.drafts / "elsewhere-1-1-00ab"
-    foreign.mkdir()
-    assert names(store, Limits()) == {}
-    then = time.time() - 2 * FOREIGN_SECONDS
-    os.utime(foreign, (then, then))
-    assert names(store, Limits()) == {foreign.name: "draft"}
+def test_a_draft_stays_as_long_as_its_lease_is_held_by_whichever_process(store: Store, recipe: Recipe) -> None:
+    with store.lease() as lease:
+        draft = store.begin(recipe, {}, lease)
+        own = store.begin(recipe, {})
+        assert names(store, Limits()) == {}
+        assert store.sweep_drafts() == 0
+    assert names(store, Limits()) == {draft.path.name: "draft"}
+    own.discard()
+    assert store.sweep_drafts() == 1
+
+
+def test_only_names_of_the_cache_s_own_form_are_deleted(store: Store, make: Make) -> None:
+    make(store)
+    mine = [store.root / folder / "mine" for folder in ("drafts", "quarantine", "locks", "leases", "checkpoints")]
+    for path in mine:
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("kept")
+    collect(store, survey(store, Limits(seconds=-1)).items)
+    store.sweep_drafts()
+    assert [path.read_text() for path in mine] == ["kept"] * len(mine)
+
+
+@pytest.mark.parametrize("folder", ["drafts", "quarantine", "locks", "leases", "checkpoints"])
+def test_a_link_in_place_of_a_folder_is_not_followed(store: Store, make: Make, tmp_path: Path, folder: str) -> None:
+    make(store)
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    names = ("ab" * 32, f"{'ab' * 32}-00ff00ff", f"{'ab' * 32}.making", LEASE, DEAD)
+    for name in names:
+        (outside / name).write_text("kept")
+    place = store.root / folder
+    if place.exists():
+        place.rmdir()
+    place.symlink_to(outside)
+    assert survey(store, Limits()).items == ()
+    store.sweep_drafts()
+    assert sorted(path.name for path in outside.iterdir()) == sorted(names)
+    if folder != "checkpoints":
+        with pytest.raises(CacheUnavailable, match="it is a link, which the cache does not follow"):
+            make(store)
 
 
 def test_a_lock_that_is_held_stays(store: Store, recipe: Recipe) -> None:

@@ -34,7 +34,7 @@ def test_what_was_set_aside_is_listed_with_its_reason(store: Store, make: Callab
     (store.layout.entry(recipe.key) / "data.zarr/map/c/0/0").unlink()
     with pytest.raises(OSError, match="is missing"):
         store.require(recipe.key)
-    (store.layout.quarantine / "unfinished").mkdir()
+    (store.layout.quarantine / f"{recipe.key}-00ff00ff").mkdir()
     report = verify(store)
     assert report.sound == ()
     reasons = sorted(report.quarantined.values())

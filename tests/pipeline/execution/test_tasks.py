@@ -11,9 +11,10 @@ from semidense.datasets import DatasetError
 from semidense.pipeline.execution import tasks
 from semidense.pipeline.execution.checkpoints import Checkpoints
 from semidense.pipeline.execution.claims import Claims
-from semidense.pipeline.execution.tasks import Context, Job
+from semidense.pipeline.execution.jobs import Context, Job, explained
 from semidense.pipeline.execution.tiles import Rows
 from semidense.pipeline.execution.watch import Unwatched
+from semidense.pipeline.plan.environment import cpu_name
 from semidense.pipeline.plan.errors import StageFailed, StageRefused, UsageError
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.steps import Step
@@ -60,7 +61,7 @@ def test_a_product_is_begun_made_and_published(context: Context, seen: Seen) -> 
     assert seen.told == [("begun", "ramp", 1), ("advanced", "ramp", 1, 1, ""), ("published", "ramp", False)]
     entry = context.store.require(made.key)
     assert entry.label == {"product": "ramp", "dataset": "toys", "scene": "Toy"}
-    assert dict(entry.extras) == {"by": "test"}
+    assert dict(entry.extras) == {"by": "test", "cpu": cpu_name(), "configuration": {}}
 
 
 def test_what_is_there_gives_a_finished_job(context: Context, seen: Seen) -> None:
@@ -132,7 +133,7 @@ def test_a_monitored_stage_reports_and_its_checkpoint_is_gone_at_the_end(context
     ],
 )
 def test_what_goes_wrong_is_named(error: Exception, kind: type[Exception], text: str) -> None:
-    with pytest.raises(kind) as caught, tasks.explained(step(RAMP, 0), str(Rows(0, 4, 10))):
+    with pytest.raises(kind) as caught, explained(step(RAMP, 0), str(Rows(0, 4, 10))):
         raise error
     assert type(caught.value) is kind
     assert str(caught.value) == text
@@ -140,7 +141,7 @@ def test_what_goes_wrong_is_named(error: Exception, kind: type[Exception], text:
 
 
 def test_an_interruption_is_not_explained() -> None:
-    with pytest.raises(KeyboardInterrupt), tasks.explained(step(RAMP, 0)):
+    with pytest.raises(KeyboardInterrupt), explained(step(RAMP, 0)):
         raise KeyboardInterrupt
 
 
@@ -161,8 +162,7 @@ def test_an_unwatched_run_is_told_everything_and_says_nothing(store: Store, caps
     assert capsys.readouterr() == ("", "")
 
 
-def test_provenance_names_versions_command_and_configuration() -> None:
-    found = tasks.provenance(["pipeline", "run"], {"semidense": {"R": 0.9}})
+def test_provenance_names_versions_and_command() -> None:
+    found = tasks.provenance(["pipeline", "run"])
     assert found["command"] == ["pipeline", "run"]
-    assert found["configuration"] == {"semidense": {"R": 0.9}}
     assert set(found["versions"]) == set(tasks.VERSIONS)

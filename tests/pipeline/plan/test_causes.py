@@ -61,10 +61,10 @@ def test_a_change_of_code_names_file_function_and_lines(toy_run: ToyRun, toy_pla
     text = source_text("semidense.cache.keys.recipe")
     assert text
     old = text.replace('return f"{self.field}: ', 'return f"{self.field} = ')
-    path = store.layout.source(source_hash(old))
-    path.parent.mkdir(parents=True)
-    path.write_text(old)
     toy_run(with_code(source_hash(old)))
+    path = store.layout.source(source_hash(old))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(old)
     said = why(toy_plan(with_code(source_hash(text))).steps[1])
     assert said.startswith("code cache/keys/recipe.py Change.__str__() line ")
     assert "{self.field} = " in said.split(" -> ")[0]

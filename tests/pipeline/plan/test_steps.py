@@ -307,7 +307,8 @@ def test_no_light_falls_on_other_channels_than_gray() -> None:
 
 
 def test_a_product_may_be_made_by_another_stage() -> None:
-    plain, used = graph(), graph("use.disparity=sgm", "sgm.uniqueness=3")
+    pure = "confidence.veto=false"  # the veto asks our own costs
+    plain, used = graph(pure), graph(pure, "use.disparity=sgm", "sgm.uniqueness=3")
     made = next(step for step in used.steps.values() if step.product == "disparity")
     assert made.stage.module == "semidense.stages.baselines.sgm"
     assert made.settings["uniqueness"] == 3

@@ -1,0 +1,144 @@
+"""Carry out tasks on a Dask cluster, whose workers, scheduler and connections may be lost at any time."""
+
+import logging
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from semidense.cache import CacheUnavailable, Lease
+from semidense.pipeline.execution.watch import Watch
+from semidense.pipeline.plan.errors import StageFailed, StageRefused, UsageError
+from semidense.pipeline.plan.plan import Made
+
+SETTLE_SECONDS = 0.3
+"""How long the write may take that a task is in when its run ends early and does not wait for it."""
+PATIENCE = 60.0
+"""Seconds without any worker after which a run is given up; one that died is started again in a few."""
+_PAUSE, _LOOK = 0.02, 1.0
+"""Seconds between two looks at what is done, and at who is there."""
+
+
+def run_on_cluster(graph: Callable[[], Sequence[Any]], lease: Lease, watch: Watch, address: str) -> dict[str, Made]:
+    """Compute delayed results on a cluster and return them by their step's id, in their order.
+
+    Args:
+        graph: gives the delayed ``Made`` of each step.
+        lease: of the run; its drafts are gone at the end, however that comes.
+        watch: told of each product that was made.
+        address: of the scheduler.
+
+    Raises:
+        UsageError: if the scheduler or all workers are lost, or one task after another kills its worker.
+        StageRefused, StageFailed: as a stage does.
+    """
+    with _quietly(), _explained(address), _connected(address) as client:
+        futures = client.compute(list(graph()))
+        try:
+            made = {each.step.id: each for each in _arriving(client, futures, watch)}
+        except BaseException:
+            _abandon(client, lease)
+            raise
+        return {step_id: made[step_id] for step_id in (future.result().step.id for future in futures)}
+
+
+@contextmanager
+def _quietly() -> Iterator[None]:
+    """Keep Dask's own words about lost connections from the terminal: one line of ours says it."""
+    logger = logging.getLogger("distributed")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+
+
+@contextmanager
+def _explained(address: str) -> Iterator[None]:
+    """Turn what Dask raises about lost machines into one line."""
+    from asyncio import CancelledError
+    from concurrent.futures import CancelledError as FutureCancelled
+
+    from distributed import KilledWorker
+
+    try:
+        yield
+    except (StageFailed, StageRefused, UsageError):
+        raise
+    except KilledWorker as error:
+        raise UsageError(
+            f"the workers at {address} died one after another at {error.task}: give them more memory, or look into "
+            "their logs; what was made before is kept"
+        ) from error
+    except (CancelledError, FutureCancelled, OSError) as error:
+        raise UsageError(
+            f"the Dask scheduler at {address} does not answer any more: start it and run again; what was made before "
+            "is kept"
+        ) from error
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[Any]:
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout="10s", set_as_default=False)
+    except (OSError, ValueError, TypeError, KeyError, RuntimeError, ImportError) as error:  # many ways to be wrong
+        raise UsageError(f"no Dask scheduler answers at {address}: {_first_line(error)}") from None
+    try:
+        yield client
+    finally:
+        with suppress(Exception):
+            client.close(timeout=2)
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).partition("\n")[0] or type(error).__name__
+
+
+def _arriving(client: Any, futures: Sequence[Any], watch: Watch) -> Iterator[Made]:  # noqa: ANN401
+    """Yield results as they come, and see to it that somebody is at work on the rest."""
+    from distributed import as_completed
+
+    arriving = as_completed(futures, loop=client.loop)
+    workers = _Workers(client)
+    while arriving.count():
+        for future in arriving.next_batch(block=False):
+            made: Made = future.result()
+            if not made.reused:
+                watch.published(made)
+            yield made
+        workers.require()
+        time.sleep(_PAUSE)
+
+
+class _Workers:
+    """Looks now and then whether a cluster has workers."""
+
+    def __init__(self, client: Any) -> None:  # noqa: ANN401
+        self._client = client
+        self._looked = self._there = time.monotonic()
+
+    def require(self) -> None:
+        """Refuse to wait on for a cluster that has been without workers for long."""
+        now = time.monotonic()
+        if now - self._looked < _LOOK:
+            return
+        self._looked = now
+        if self._client.nthreads():
+            self._there = now
+        elif now - self._there > PATIENCE:
+            raise UsageError(
+                f"no worker has been there for {PATIENCE:.0f} s: start some and run again; what was made before is kept"
+            )
+
+
+def _abandon(client: Any, lease: Lease) -> None:  # noqa: ANN401
+    """Leave the cluster and delete the run's drafts; its workers may live on."""
+    with suppress(Exception):
+        client.close(timeout=2)  # this releases what is still to be computed
+    for _ in range(2):  # a write that is under way brings its folder back, once
+        with suppress(CacheUnavailable):
+            lease.discard_drafts()
+        time.sleep(SETTLE_SECONDS)

@@ -1,0 +1,235 @@
+"""Rows 13 and 16: workers with other code, and workers and schedulers that are killed, on real Dask clusters."""
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from semidense.cache import Store
+from semidense.pipeline import api
+from semidense.pipeline.api import Task
+from semidense.pipeline.execution import cluster as clusters
+from semidense.pipeline.execution.retry import attempt
+from semidense.pipeline.execution.watch import Unwatched
+from semidense.pipeline.plan.errors import UsageError
+from tests.faults import slow, world
+from tests.faults.tally import Tally
+from tests.tiny import TEST_ONLY
+
+PROJECT = Path(__file__).parents[2]
+SCENES = 8
+EDITS = (
+    ("stages/transforms/gray.py", "semidense.stages.transforms.gray"),
+    ("pipeline/execution/tiles.py", "semidense.pipeline.execution.tiles"),
+    ("datasets/scene.py", "semidense.datasets.scene"),
+    ("pipeline/plan/images_and_truth.py", "semidense.pipeline.plan.images_and_truth"),
+    ("cache/entries/draft.py", "semidense.cache.entries.draft"),
+)
+"""Files of which a worker has another version, and their modules."""
+
+
+def other_code(scale: float) -> Tally:
+    """Let a worker have another version of a file than the run's own process."""
+    tally = Tally()
+    for path, module in EDITS[: max(1, int(len(EDITS) * scale))]:
+        with world.folder() as root, _edited_installation(root.parent, path) as names, _cluster(0) as address:
+            worker = _worker(address, names, root.parent / "log")
+            tally.injected += 1
+            try:
+                api.run(Task(TEST_ONLY, cache=root), "images", scheduler=address)
+                tally.fail("wrong", f"{path}: nothing was refused")
+            except UsageError as error:
+                if f"the module {module} has another text here" not in str(error) or "\n" in str(error):
+                    tally.fail("tracebacks", f"{path}: {error}")
+            finally:
+                worker.kill()
+                worker.wait()
+            _nothing_left(tally, Store(root), path)
+            if published := list(Store(root).entries()):
+                tally.fail("wrong", f"{path}: {published[0].label} was published")
+    return tally
+
+
+@contextmanager
+def _edited_installation(folder: Path, path: str) -> Iterator[Path]:
+    """Copy the packages, and change what one file does."""
+    for package in ("pipeline", "stages", "datasets", "cache"):
+        shutil.copytree(PROJECT / package, folder / "semidense" / package, ignore=shutil.ignore_patterns("__pycache__"))
+    with (folder / "semidense" / path).open("a") as file:
+        file.write("\n_EDITED = True\n")
+    yield folder
+
+
+def _worker(address: str, names: Path, log: Path) -> "subprocess.Popen[bytes]":
+    command = ["-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    environment = {**os.environ, "PYTHONPATH": str(names)}
+    with log.open("wb") as file:
+        return subprocess.Popen(
+            [sys.executable, *command], env=environment, cwd=names, stdout=file, stderr=subprocess.STDOUT
+        )
+
+
+@contextmanager
+def _cluster(workers: int) -> Iterator[str]:
+    """Start a scheduler, with worker processes that are started again when they die."""
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=60
+    ) as cluster:
+        yield cluster.scheduler_address
+
+
+def _nothing_left(tally: Tally, store: Store, where: str) -> None:
+    for path in world.leftovers(store):
+        tally.fail("leftovers", f"{where}: {path}")
+
+
+def killed_workers(scale: float) -> Tally:
+    """Kill one of four workers at a random time of a run of eight scenes; then the scheduler, and all workers."""
+    tally, chance = Tally(), random.Random(16)
+    with _cluster(4) as address:
+        undisturbed, expected = _undisturbed(address)
+        slowest = 0.0
+        for number in range(max(2, int(60 * scale))):
+            where = f"kill {number}"
+            with world.folder() as root:
+                killer = _Killer(address, chance.uniform(0, undisturbed), chance.randrange(4))
+                seconds = _run(tally, Store(root), address, expected, where)
+                killer.join()
+                slowest = max(slowest, seconds / undisturbed)
+            tally.injected += 1
+    tally.figures["slowest run in undisturbed ones"] = round(slowest, 1)
+    _killed_schedulers(tally, max(1, int(3 * scale)))
+    _no_workers(tally)
+    return tally
+
+
+def _undisturbed(address: str) -> tuple[float, dict[str, str]]:
+    """Return how long a run takes, and its digests; the first one also loads the workers."""
+    expected: dict[str, str] = {}
+    for _ in range(2):
+        with world.folder() as root:
+            started = time.monotonic()
+            store, graph = Store(root), slow.scenes(SCENES)
+            made = attempt(lambda s=store, g=graph: world.plan(s, g), store, Unwatched(), {}, address)[1]  # type: ignore[misc]
+            expected = {each.key: each.digest for each in made.values()}
+    return time.monotonic() - started, expected
+
+
+def _run(tally: Tally, store: Store, address: str, expected: dict[str, str], where: str) -> float:
+    started, graph = time.monotonic(), slow.scenes(SCENES)
+    try:
+        made = attempt(lambda: world.plan(store, graph), store, Unwatched(), {}, address)[1]
+    except Exception as error:  # noqa: BLE001 - whatever it is, the run must not fail
+        tally.fail("lost", f"{where}: {error!r}")
+    else:
+        if {each.key: each.digest for each in made.values()} != expected:
+            tally.fail("wrong", f"{where}: other digests")
+    world.judge(tally, store, expected, where)
+    _nothing_left(tally, store, where)
+    return time.monotonic() - started
+
+
+class _Killer:
+    """Kills a worker after a while, and waits until the cluster is whole again."""
+
+    def __init__(self, address: str, after: float, which: int) -> None:
+        from distributed import Client
+
+        self._client = Client(address, set_as_default=False)
+        self._client.wait_for_workers(4)
+        pids: dict[str, int] = self._client.run(os.getpid)
+        self._pid = sorted(pids.values())[which]
+        self._timer = threading.Timer(after, self._kill)
+        self._timer.start()
+
+    def _kill(self) -> None:
+        with suppress(ProcessLookupError):
+            os.kill(self._pid, signal.SIGKILL)
+
+    def join(self) -> None:
+        self._timer.join()
+        deadline = time.monotonic() + world.HANGS
+        while time.monotonic() < deadline:
+            with suppress(Exception):
+                pids = self._client.run(os.getpid, on_error="ignore")
+                if len(pids) == 4 and self._pid not in pids.values():
+                    break
+            time.sleep(0.1)
+        self._client.close()
+
+
+def _killed_schedulers(tally: Tally, trials: int) -> None:
+    """Kill a scheduler in the middle of a run: one line, and nothing is left."""
+    for number in range(trials):
+        with world.folder() as root, _outside(root.parent) as (address, scheduler):
+            store, graph = Store(root), slow.scenes(SCENES)
+            threading.Timer(1.0 + 0.5 * number, scheduler.kill).start()
+            tally.injected += 1
+            _refused(tally, store, graph, address, "does not answer", f"scheduler killed, {number}")
+
+
+@contextmanager
+def _outside(folder: Path) -> Iterator[tuple[str, "subprocess.Popen[bytes]"]]:
+    """Start a scheduler and a worker as processes of their own."""
+    file = folder / "scheduler.json"
+    options = ["--scheduler-file", str(file), "--port", "0", "--no-dashboard"]
+    with (folder / "log").open("wb") as log:
+        scheduler = subprocess.Popen(
+            [sys.executable, "-m", "distributed.cli.dask_scheduler", *options], stdout=log, stderr=log, cwd=PROJECT
+        )
+        address = _address(file)
+        worker = _worker(address, PROJECT / "build" / "names", folder / "worker")
+        try:
+            yield address, scheduler
+        finally:
+            for process in (worker, scheduler):
+                process.kill()
+                process.wait()
+
+
+def _address(file: Path) -> str:
+    import json
+
+    deadline = time.monotonic() + world.HANGS
+    while time.monotonic() < deadline:
+        with suppress(OSError, ValueError, KeyError):
+            return str(json.loads(file.read_text())["address"])
+        time.sleep(0.05)
+    raise RuntimeError("no scheduler started")
+
+
+def _refused(tally: Tally, store: Store, graph: Any, address: str, words: str, where: str) -> None:  # noqa: ANN401
+    try:
+        attempt(lambda: world.plan(store, graph), store, Unwatched(), {}, address)
+        tally.fail("lost", f"{where}: the run did not end with an error")
+    except UsageError as error:
+        if words not in str(error) or "\n" in str(error):
+            tally.fail("tracebacks", f"{where}: {error}")
+    except Exception as error:  # noqa: BLE001
+        tally.fail("tracebacks", f"{where}: {error!r}")
+    _nothing_left(tally, store, where)
+
+
+def _no_workers(tally: Tally) -> None:
+    """Run where no worker ever is, and where no scheduler is."""
+    real, clusters.PATIENCE = clusters.PATIENCE, 1.5
+    try:
+        with world.folder() as root, _cluster(0) as address:
+            tally.injected += 1
+            _refused(tally, Store(root), slow.scenes(1), address, "no worker has been there", "no workers")
+    finally:
+        clusters.PATIENCE = real
+    for address in ("tcp://127.0.0.1:9", "nonsense://x", "tcp://", "127.0.0.1", "tcp://127.0.0.1:port", ":", "a b"):
+        with world.folder() as root:
+            tally.injected += 1
+            _refused(tally, Store(root), slow.scenes(1), address, "no Dask scheduler answers at", address)
