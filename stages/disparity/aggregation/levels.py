@@ -1,0 +1,86 @@
+"""Costs as whole numbers: sums of these are exact, so a result does not depend on how the image is cut."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semidense.stages.compute.kernel import kernel
+from semidense.stages.stage import StageError, require_shape
+
+SCALE = 8
+"""Levels of one unit of cost. Both kinds of volume store log-odds, so one scale and one set of penalties fit all."""
+CAP = 40 * SCALE
+"""Largest cost above the pixel's least, levels. Log-odds of trained networks differ by less than 40."""
+NO_COST = np.int16(np.iinfo(np.int16).max)
+"""The least cost of a pixel that has none."""
+_LARGEST = 1 << 14
+
+
+@dataclass(frozen=True)
+class Levels:
+    """The costs of some rows of an image, in whole levels.
+
+    Attributes:
+        above: (y, x, d) int16 in [0, CAP]: cost above the pixel's least. A cell without a cost has ``CAP``; a pixel
+            without any cost has 0 everywhere, so that it says nothing.
+        least: (y, x) int16: the pixel's least cost; ``NO_COST`` if it has none.
+        d_min: the disparity of index 0, px.
+    """
+
+    above: NDArray[np.int16]
+    least: NDArray[np.int16]
+    d_min: int
+
+
+def levels_of(costs: NDArray[Any], d_min: int) -> Levels:
+    """Return costs in whole levels, ``rint(SCALE * cost)`` less the pixel's least and at most ``CAP``.
+
+    Args:
+        costs: (y, x, d) float16 or float32, lower is better; NaN is a cell without a cost. float32 is rounded to
+            float16 first, as a cached volume is. Infinite costs count as the largest and the smallest level.
+        d_min: the disparity of index 0, px.
+
+    Raises:
+        StageError: if ``costs`` has another dtype or shape.
+    """
+    require_shape("the cost volume", costs, 3)
+    if costs.dtype not in (np.float16, np.float32):
+        raise StageError(f"the cost volume has dtype {costs.dtype}, expected float16 or float32")
+    with np.errstate(over="ignore"):  # what float16 cannot hold is infinite, and infinite is the largest level
+        bits = np.ascontiguousarray(costs, np.float16).view(np.uint16)
+    made = Levels(np.empty(costs.shape, np.int16), np.empty(costs.shape[:2], np.int16), d_min)
+    _fill(bits, _LEVEL_OF_HALF, made.above, made.least)
+    return made
+
+
+def _level_of_half() -> NDArray[np.int16]:
+    """Return the level of each of the 65536 float16 numbers, by its bits."""
+    values = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float64)
+    rounded = np.clip(np.rint(values * SCALE), -_LARGEST, _LARGEST)
+    return np.where(np.isnan(values), NO_COST, np.nan_to_num(rounded)).astype(np.int16)
+
+
+_LEVEL_OF_HALF = _level_of_half()
+
+
+@kernel
+def _fill(
+    bits: NDArray[np.uint16], level: NDArray[np.int16], above: NDArray[np.int16], least: NDArray[np.int16]
+) -> None:
+    """Write the levels and the least of each pixel."""
+    height, width, depth = bits.shape
+    for y in range(height):
+        for x in range(width):
+            low = NO_COST
+            for d in range(depth):
+                above[y, x, d] = level[bits[y, x, d]]
+                low = min(low, above[y, x, d])
+            least[y, x] = low
+            if low == NO_COST:
+                above[y, x] = 0
+                continue
+            for d in range(depth):
+                # In 32 bits: the difference of two levels may not fit 16.
+                above[y, x, d] = np.int16(min(np.int32(above[y, x, d]) - np.int32(low), np.int32(CAP)))
