@@ -101,7 +101,7 @@ class Config(BaseModel):
 def _model(products: tuple[str, ...]) -> type[Config]:
     """Return the model with a section for each of the products that has settings, and the sections of choices."""
     stages = [STAGES[product] for product in products]
-    sections = {stage.product: stage.params for stage in stages if stage.params is not NoParams}
+    sections = {stage.product: stage.params for stage in stages if stage.params is not NoParams and not stage.section}
     sections["weights"] = _choices("weights", [stage.product for stage in stages if stage.learnt])
     sections["use"] = _choices("use", products)
     fields: dict[str, Any] = {name: (kind, kind()) for name, kind in sections.items()}

@@ -1,12 +1,14 @@
 """What the costs say of each pixel: whether one disparity stands out, or many would do as well."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.disparity.aggregation.levels import CAP, SCALE
+from semidense.stages.disparity.aggregation.levels import CAP, SCALE, ends
 from semidense.stages.disparity.aggregation.strips import Strip
-from semidense.stages.disparity.aggregation.winner import NONE, ends, first_least
+from semidense.stages.disparity.aggregation.winner import NONE, first_least
 
 FEATURES = (
     "aggregated_margin",
@@ -48,26 +50,25 @@ def evidence(strip: Strip, winner: NDArray[np.int32], paths: int) -> NDArray[np.
     Returns:
         (feature, y, x) float32, see ``FEATURES``; NaN where there is no winner.
     """
-    single, aggregated = strip.single.above, strip.aggregated
+    single, aggregated, d_min = strip.single, strip.aggregated, strip.single.d_min
     made = np.full((len(FEATURES), *winner.shape), np.nan, np.float32)
-    right = np.empty(winner.shape[1:], np.int32)
-    least = np.empty(winner.shape[1:], np.uint16)
+    least, right = np.empty(winner.shape[1], np.uint16), np.empty(winner.shape[1], np.int32)
     for y in range(len(winner)):
-        _right_winner(aggregated[y], strip.single.d_min, least, right)
-        _evidence(
-            single[y], strip.single.least[y], aggregated[y], winner[y], right, strip.single.d_min, paths, made[:, y]
-        )
+        _right_winner(aggregated[y], d_min, least, right)
+        _evidence(single.above[y], single.least[y], aggregated[y], winner[y], right, d_min, paths, made[:, y])
     return made
 
 
 @kernel
-def _right_winner(aggregated: NDArray[np.uint16], d_min: int, least: NDArray[np.uint16], right: NDArray[np.int32]) -> None:
+def _right_winner(
+    aggregated: NDArray[np.uint16], d_min: int, least: NDArray[np.uint16], right: NDArray[np.int32]
+) -> None:
     """Write the index of the least cost of each right pixel of a row; of equal costs the smallest disparity's."""
     width, depth = aggregated.shape
     least[:] = np.uint16(0xFFFF)
     right[:] = NONE
-    for d in range(depth):
-        for x in range(max(0, d + d_min), min(width, width + d + d_min)):
+    for x in range(width):
+        for d in range(*ends(x, width, d_min, depth)):
             if aggregated[x, d] < least[x - d - d_min]:
                 least[x - d - d_min] = aggregated[x, d]
                 right[x - d - d_min] = d
@@ -86,52 +87,52 @@ def _evidence(
 ) -> None:
     """Write the features of one row."""
     width, depth = single.shape
+    near, near_sum = np.int16(NEAR * SCALE), np.uint16(NEAR * SCALE * paths)
     for x in range(width):
         best = winner[x]
         if best == NONE:
             continue
         first, end = ends(x, width, d_min, depth)
         alone = first_least(single[x], first, end)
-        made[0, x] = _margin(aggregated[x], best, first, end, paths * CAP) / (paths * SCALE)
-        made[1, x] = _margin(single[x], alone, first, end, CAP) / SCALE
+        low, low_sum = single[x, alone], aggregated[x, best]
+        rival = _rival(single[x], alone, first, end, np.int16(low + CAP))
+        rival_sum = _rival(aggregated[x], best, first, end, np.uint16(low_sum + paths * CAP))
+        made[0, x] = (np.int64(rival_sum) - np.int64(low_sum)) / (paths * SCALE)
+        made[1, x] = (np.int64(rival) - np.int64(low)) / SCALE
         made[2, x] = single[x, best] / SCALE
         made[3, x] = (np.int64(single[x, best]) + np.int64(least[x])) / SCALE
         made[4, x] = abs(best - right[x - best - d_min])
         made[5, x] = abs(alone - best) <= 1
-        made[6, x] = _near(aggregated[x], best, first, end, round(NEAR * SCALE * paths)) / (end - first)
-        made[7, x] = _near(single[x], alone, first, end, round(NEAR * SCALE)) / (end - first)
-        made[8, x] = _minima(single[x], alone, first, end, round(NEAR * SCALE))
+        made[6, x] = _near(aggregated[x], np.uint16(low_sum + near_sum), first, end) / (end - first)
+        made[7, x] = _near(single[x], np.int16(low + near), first, end) / (end - first)
+        made[8, x] = _minima(single[x], np.int16(low + near), first, end)
 
 
 @kernel
-def _margin(costs: NDArray[np.int16], best: int, first: int, end: int, most: int) -> int:
-    """Return how far the least cost that is not beside the best lies above it, at most ``most``."""
-    margin = most
+def _rival(costs: NDArray[Any], best: int, first: int, end: int, most: Any) -> Any:  # noqa: ANN401 - either integer type
+    """Return the least cost that is not beside the best, at most ``most``."""
     for d in range(first, best - 1):
-        margin = min(margin, np.int64(costs[d]) - np.int64(costs[best]))
+        most = min(most, costs[d])
     for d in range(best + 2, end):
-        margin = min(margin, np.int64(costs[d]) - np.int64(costs[best]))
-    return margin
+        most = min(most, costs[d])
+    return most
 
 
 @kernel
-def _near(costs: NDArray[np.int16], best: int, first: int, end: int, margin: int) -> int:
-    """Return how many costs are within a margin of the best."""
+def _near(costs: NDArray[Any], most: Any, first: int, end: int) -> int:  # noqa: ANN401 - either integer type
+    """Return how many costs are at most ``most``."""
     count = 0
     for d in range(first, end):
-        count += np.int64(costs[d]) <= np.int64(costs[best]) + margin
+        count += costs[d] <= most
     return count
 
 
 @kernel
-def _minima(costs: NDArray[np.int16], best: int, first: int, end: int, margin: int) -> int:
-    """Return how many local minima are within a margin of the best; a plateau is one."""
-    count = 0
+def _minima(costs: NDArray[np.int16], most: np.int16, first: int, end: int) -> int:
+    """Return how many local minima cost at most ``most``; a plateau is one."""
+    count, falling = 0, True
     for d in range(first, end):
-        falls = d == first or costs[d] < costs[d - 1]
-        after = d + 1
-        while after < end and costs[after] == costs[d]:
-            after += 1
-        rises = after == end or costs[after] > costs[d]
-        count += falls and rises and np.int64(costs[d]) <= np.int64(costs[best]) + margin
-    return count
+        if d > first and costs[d] != costs[d - 1]:
+            count += falling and costs[d] > costs[d - 1] and costs[d - 1] <= most
+            falling = costs[d] < costs[d - 1]
+    return count + (falling and costs[end - 1] <= most)

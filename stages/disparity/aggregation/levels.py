@@ -23,8 +23,9 @@ class Levels:
     """The costs of some rows of an image, in whole levels.
 
     Attributes:
-        above: (y, x, d) int16 in [0, CAP]: cost above the pixel's least. A cell without a cost has ``CAP``; a pixel
-            without any cost has 0 everywhere, so that it says nothing.
+        above: (y, x, d) int16 in [0, CAP]: cost above the pixel's least. A cell without a cost has ``CAP``; one whose
+            right pixel is outside the image has the mean of the pixel's others, which speaks neither for nor against
+            it; a pixel without any cost has 0 everywhere.
         least: (y, x) int16: the pixel's least cost; ``NO_COST`` if it has none.
         d_min: the disparity of index 0, px.
     """
@@ -39,7 +40,7 @@ def levels_of(costs: NDArray[Any], d_min: int) -> Levels:
 
     Args:
         costs: (y, x, d) float16 or float32, lower is better; NaN is a cell without a cost. float32 is rounded to
-            float16 first, as a cached volume is. Infinite costs count as the largest and the smallest level.
+            float16 first, as a cached volume is. An infinite cost counts as ``CAP`` above the least, or as the least.
         d_min: the disparity of index 0, px.
 
     Raises:
@@ -51,23 +52,34 @@ def levels_of(costs: NDArray[Any], d_min: int) -> Levels:
     with np.errstate(over="ignore"):  # what float16 cannot hold is infinite, and infinite is the largest level
         bits = np.ascontiguousarray(costs, np.float16).view(np.uint16)
     made = Levels(np.empty(costs.shape, np.int16), np.empty(costs.shape[:2], np.int16), d_min)
-    _fill(bits, _LEVEL_OF_HALF, made.above, made.least)
+    _fill(bits, _LEVEL_OF_HALF, d_min, made.above, made.least)
     return made
 
 
 def _level_of_half() -> NDArray[np.int16]:
     """Return the level of each of the 65536 float16 numbers, by its bits."""
-    values = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float64)
-    rounded = np.clip(np.rint(values * SCALE), -_LARGEST, _LARGEST)
-    return np.where(np.isnan(values), NO_COST, np.nan_to_num(rounded)).astype(np.int16)
+    values = np.arange(1 << 16, dtype=np.uint16).view(np.float16)
+    numbers = np.where(np.isnan(values), np.float16(0), values).astype(np.float64)
+    rounded = np.clip(np.rint(numbers * SCALE), -_LARGEST, _LARGEST)
+    return np.where(np.isnan(values), NO_COST, rounded.astype(np.int16))
 
 
 _LEVEL_OF_HALF = _level_of_half()
 
 
 @kernel
+def ends(x: int, width: int, d_min: int, depth: int) -> tuple[int, int]:
+    """Return the first and the end index of the disparities whose right pixel, ``x - d``, is in the image."""
+    return max(0, x - (width - 1) - d_min), min(depth, x - d_min + 1)
+
+
+@kernel
 def _fill(
-    bits: NDArray[np.uint16], level: NDArray[np.int16], above: NDArray[np.int16], least: NDArray[np.int16]
+    bits: NDArray[np.uint16],
+    level: NDArray[np.int16],
+    d_min: int,
+    above: NDArray[np.int16],
+    least: NDArray[np.int16],
 ) -> None:
     """Write the levels and the least of each pixel."""
     height, width, depth = bits.shape
@@ -84,3 +96,17 @@ def _fill(
             for d in range(depth):
                 # In 32 bits: the difference of two levels may not fit 16.
                 above[y, x, d] = np.int16(min(np.int32(above[y, x, d]) - np.int32(low), np.int32(CAP)))
+            _fill_outside(above[y, x], *ends(x, width, d_min, depth))
+
+
+@kernel
+def _fill_outside(above: NDArray[np.int16], first: int, end: int) -> None:
+    """Give the cells whose right pixel is outside the image the mean of the others."""
+    count = end - first
+    if 0 < count < above.size:
+        total = 0
+        for d in range(first, end):
+            total += above[d]
+        mean = np.int16((total + count // 2) // count)
+        above[:first] = mean
+        above[end:] = mean

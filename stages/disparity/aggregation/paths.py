@@ -9,49 +9,30 @@ Source: Hirschmüller, "Stereo processing by semiglobal matching and mutual info
 """
 
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
 from semidense.stages.disparity.aggregation.levels import SCALE, Levels
+from semidense.stages.disparity.declaration import AggregatedParams
 
-Paths = Literal[8, 16]
 DOWN = np.array([(0, 1), (1, -1), (1, 0), (1, 1), (1, 2), (1, -2), (2, 1), (2, -1)])
 """Steps ``r`` (rows, columns) of the paths that are followed going down: the first four of 8 paths, all of 16."""
 BEYOND = np.int16(16_000)
 """Stands for the cost beyond both ends of the range: above every path's, also with a penalty added."""
 
 
-@dataclass(frozen=True)
-class Penalties:
-    """What a path pays for changing its disparity.
+def steps_down(params: AggregatedParams) -> NDArray[np.int64]:
+    """Return the steps of the paths that are followed going down, (path, 2)."""
+    return DOWN[: params.paths // 2]
 
-    Attributes:
-        paths: directions that are summed, 8 or 16.
-        small: P1, for a step of 1 px, units of cost.
-        large: P2, for a larger one, units of cost; at least P1.
-        edge_step: neighbours whose gray differs by more levels have an edge between them.
-        edge_divisor: both penalties are divided by it at an edge.
-    """
 
-    paths: Paths
-    small: float
-    large: float
-    edge_step: int
-    edge_divisor: float
-
-    @property
-    def steps(self) -> NDArray[np.int64]:
-        """Steps of the paths that are followed going down, (path, 2)."""
-        return DOWN[: self.paths // 2]
-
-    @property
-    def table(self) -> NDArray[np.int16]:
-        """P1 and P2 in levels, (plain or edge, 2)."""
-        plain = np.array([self.small, self.large]) * SCALE
-        return np.rint([plain, plain / self.edge_divisor]).astype(np.int16)
+def penalties(params: AggregatedParams) -> NDArray[np.int16]:
+    """Return P1 and P2 in levels, (plain or edge, 2)."""
+    plain = np.array([params.p1, params.p2]) * SCALE
+    return np.rint([plain, plain / params.edge_divisor]).astype(np.int16)
 
 
 @dataclass(frozen=True)
@@ -80,7 +61,7 @@ def follow(
     levels: Levels,
     gray: NDArray[np.uint8],
     top: int,
-    penalties: Penalties,
+    params: AggregatedParams,
     front: Front,
     sums: NDArray[np.int16],
     *,
@@ -92,7 +73,7 @@ def follow(
         levels: the rows' costs.
         gray: (y, x) uint8 of the whole image.
         top: the row of the image that is the first of ``levels``.
-        penalties: what a change of disparity costs.
+        params: paths and penalties.
         front: of the rows before, which lie below when going upwards.
         sums: (y, x, d) int16, levels, modulo 2 ** 16; the path costs are added.
         upwards: go from the last row to the first, along the opposite directions.
@@ -102,8 +83,8 @@ def follow(
     """
     # One more row, which the first row is written to; afterwards the oldest row goes.
     costs, least = (np.concatenate([each, each[:, :1]], axis=1) for each in (front.costs, front.least))
-    steps = penalties.steps
-    _follow(levels.above, gray, top, steps, penalties.table, penalties.edge_step, costs, least, sums, upwards)
+    steps, table = steps_down(params), penalties(params)
+    _follow(levels.above, gray, top, steps, table, params.edge_step, costs, least, sums, upwards)
     turn = -(len(levels.above) % costs.shape[1])
     return Front(*(np.roll(each, turn, axis=1)[:, :-1].copy() for each in (costs, least)))
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.disparity.aggregation.levels import Levels, levels_of
-from semidense.stages.disparity.aggregation.paths import Front, Penalties, follow
+from semidense.stages.disparity.aggregation.paths import Front, follow, steps_down
+from semidense.stages.disparity.declaration import AggregatedParams
 from semidense.stages.stage import StageError
 
 CELLS = 1 << 26
@@ -50,7 +51,7 @@ class Strip:
 
 
 def aggregate(
-    volume: Volume, gray: NDArray[np.uint8], d_min: int, penalties: Penalties, rows: int | None = None
+    volume: Volume, gray: NDArray[np.uint8], d_min: int, params: AggregatedParams, rows: int | None = None
 ) -> Iterator[Strip]:
     """Yield the aggregated volume in strips, the last rows first.
 
@@ -59,7 +60,7 @@ def aggregate(
             strip at a time; once, if it is one strip.
         gray: (y, x) uint8 of the same view: penalties are smaller across its edges.
         d_min: the disparity of index 0, px.
-        penalties: what a change of disparity along a path costs.
+        params: paths and penalties.
         rows: rows of a strip; None: as many as ``CELLS`` allows.
 
     Raises:
@@ -69,18 +70,18 @@ def aggregate(
         raise StageError(f"the cost volume has shape {volume.shape}, the view {gray.shape}: y and x must agree")
     height, width, depth = volume.shape
     strips = cut(height, rows or strip_rows(width, depth))
-    begin = Front.beginning(penalties.steps, width, depth)
+    begin = Front.beginning(steps_down(params), width, depth)
     fronts = [begin]
     for strip in strips[:-1]:
         levels = levels_of(volume[strip], d_min)
         ignored = np.empty(levels.above.shape, np.int16)
-        fronts.append(follow(levels, gray, strip.start, penalties, fronts[-1], ignored, upwards=False))
+        fronts.append(follow(levels, gray, strip.start, params, fronts[-1], ignored, upwards=False))
     below = begin
     for strip in reversed(strips):
         levels = levels_of(volume[strip], d_min)
         sums = np.zeros(levels.above.shape, np.int16)
-        follow(levels, gray, strip.start, penalties, fronts.pop(), sums, upwards=False)
-        below = follow(levels, gray, strip.start, penalties, below, sums, upwards=True)
+        follow(levels, gray, strip.start, params, fronts.pop(), sums, upwards=False)
+        below = follow(levels, gray, strip.start, params, below, sums, upwards=True)
         yield Strip(strip, levels, sums.view(np.uint16))
 
 

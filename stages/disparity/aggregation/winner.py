@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.disparity.aggregation.levels import NO_COST
+from semidense.stages.disparity.aggregation.levels import NO_COST, ends
 from semidense.stages.disparity.aggregation.strips import Strip
 
 NONE = -1
@@ -41,12 +41,6 @@ def parabola(strip: Strip, index: NDArray[np.int32]) -> NDArray[np.float32]:
 
 
 @kernel
-def ends(x: int, width: int, d_min: int, depth: int) -> tuple[int, int]:
-    """Return the first and the end index of the disparities whose right pixel is in the image."""
-    return max(0, x - (width - 1) - d_min), min(depth, x - d_min + 1)
-
-
-@kernel
 def first_least(costs: NDArray[Any], first: int, end: int) -> int:
     """Return the index of the first least of some costs; there must be one at least."""
     low = costs[first]
@@ -70,9 +64,7 @@ def _least(aggregated: NDArray[np.uint16], least: NDArray[np.int16], d_min: int,
 
 
 @kernel
-def _shift(
-    aggregated: NDArray[np.uint16], index: NDArray[np.int32], d_min: int, shift: NDArray[np.float32]
-) -> None:
+def _shift(aggregated: NDArray[np.uint16], index: NDArray[np.int32], d_min: int, shift: NDArray[np.float32]) -> None:
     """Write the shift of each pixel that has a winner with two neighbours."""
     height, width, depth = aggregated.shape
     for y in range(height):
@@ -80,8 +72,11 @@ def _shift(
             first, end = ends(x, width, d_min, depth)
             d = index[y, x]
             if first < d < end - 1:
-                before, here, after = (np.int64(aggregated[y, x, d - 1]), np.int64(aggregated[y, x, d]),
-                                       np.int64(aggregated[y, x, d + 1]))
+                before, here, after = (
+                    np.int64(aggregated[y, x, d - 1]),
+                    np.int64(aggregated[y, x, d]),
+                    np.int64(aggregated[y, x, d + 1]),
+                )
                 bend = before - 2 * here + after
                 if bend > 0:  # the winner is the least, so the lowest point is at most half a pixel away
                     shift[y, x] = (before - after) / (2 * bend)
