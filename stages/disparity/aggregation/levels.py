@@ -13,6 +13,9 @@ SCALE = 8
 """Levels of one unit of cost. Both kinds of volume store log-odds, so one scale and one set of penalties fit all."""
 CAP = 40 * SCALE
 """Largest cost above the pixel's least, levels. Log-odds of trained networks differ by less than 40."""
+NOT_JUDGED = 4 * SCALE
+"""Cost above the pixel's least of a cell without a cost, levels: a guided volume has none where descriptors already saw
+that the cell hardly wins."""
 NO_COST = np.int16(np.iinfo(np.int16).max)
 """The least cost of a pixel that has none."""
 _LARGEST = 1 << 14
@@ -23,9 +26,9 @@ class Levels:
     """The costs of some rows of an image, in whole levels.
 
     Attributes:
-        above: (y, x, d) int16 in [0, CAP]: cost above the pixel's least. A cell without a cost has ``CAP``; one whose
-            right pixel is outside the image has the mean of the pixel's others, which speaks neither for nor against
-            it; a pixel without any cost has 0 everywhere.
+        above: (y, x, d) int16 in [0, CAP]: cost above the pixel's least. A cell without a cost has ``NOT_JUDGED``; one
+            whose right pixel is outside the image has the mean of the pixel's others, which speaks neither for nor
+            against it; a pixel without any cost has 0 everywhere.
         least: (y, x) int16: the pixel's least cost; ``NO_COST`` if it has none.
         d_min: the disparity of index 0, px.
     """
@@ -94,8 +97,8 @@ def _fill(
                 above[y, x] = 0
                 continue
             for d in range(depth):
-                # In 32 bits: the difference of two levels may not fit 16.
-                above[y, x, d] = np.int16(min(np.int32(above[y, x, d]) - np.int32(low), np.int32(CAP)))
+                cost = np.int32(above[y, x, d]) - np.int32(low)  # the difference of two levels may not fit 16 bits
+                above[y, x, d] = np.int16(NOT_JUDGED if above[y, x, d] == NO_COST else min(cost, np.int32(CAP)))
             _fill_outside(above[y, x], *ends(x, width, d_min, depth))
 
 

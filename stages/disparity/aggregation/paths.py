@@ -103,35 +103,57 @@ def _follow(
     upwards: bool,
 ) -> None:
     """Follow the paths through all rows; a row's path costs replace the oldest ones."""
-    height, width = above.shape[:2]
-    slots, margin = costs.shape[1], (costs.shape[2] - width) // 2
+    height, slots = above.shape[0], costs.shape[1]
     sign = -1 if upwards else 1
-    before = np.empty(len(steps), np.int64)
     for row in range(height):
         y = height - 1 - row if upwards else row
         now = (slots - 1 + row) % slots
         for path in range(len(steps)):
-            before[path] = (now - steps[path, 0]) % slots
-        for column in range(width):
-            x = width - 1 - column if upwards else column
-            for path in range(len(steps)):
-                u, v = x - sign * steps[path, 1], top + y - sign * steps[path, 0]
-                edge = _is_edge(gray, top + y, x, v, u, edge_step)
-                least[path, now, x + margin] = _extend(
-                    costs,
-                    path,
-                    before[path],
-                    u + margin,
-                    now,
-                    x + margin,
-                    least[path, before[path], u + margin],
-                    table[edge, 0],
-                    table[edge, 1],
-                    above,
-                    sums,
-                    y,
-                    x,
-                )
+            dy, dx = sign * steps[path, 0], sign * steps[path, 1]
+            before = (now - steps[path, 0]) % slots
+            _follow_row(
+                above[y],
+                gray,
+                top + y,
+                dy,
+                dx,
+                table,
+                edge_step,
+                costs[path, before],
+                costs[path, now],
+                least[path, before],
+                least[path, now],
+                sums[y],
+                upwards,
+            )
+
+
+@kernel
+def _follow_row(
+    above: NDArray[np.int16],
+    gray: NDArray[np.uint8],
+    y: int,
+    dy: int,
+    dx: int,
+    table: NDArray[np.int16],
+    edge_step: int,
+    before: NDArray[np.int16],
+    now: NDArray[np.int16],
+    least_before: NDArray[np.int16],
+    least_now: NDArray[np.int16],
+    sums: NDArray[np.int16],
+    backwards: bool,
+) -> None:
+    """Follow the paths of one direction through row ``y`` of the image, from the row that they come from."""
+    width = len(above)
+    margin = (len(now) - width) // 2
+    for column in range(width):
+        x = width - 1 - column if backwards else column
+        own, other = x + margin, x - dx + margin
+        edge = _is_edge(gray, y, x, y - dy, x - dx, edge_step)
+        least_now[own] = _extend(
+            before, other, now, own, least_before[other], table[edge, 0], table[edge, 1], above, sums, x
+        )
 
 
 @kernel
@@ -144,31 +166,29 @@ def _is_edge(gray: NDArray[np.uint8], y: int, x: int, v: int, u: int, edge_step:
 
 @kernel
 def _extend(
-    costs: NDArray[np.int16],
-    path: int,
-    before: int,
-    u: int,
-    now: int,
-    x: int,
+    before: NDArray[np.int16],
+    other: int,
+    now: NDArray[np.int16],
+    own: int,
     low: np.int16,
     small: np.int16,
     large: np.int16,
     above: NDArray[np.int16],
     sums: NDArray[np.int16],
-    row: int,
-    column: int,
+    x: int,
 ) -> np.int16:
     """Extend one path by one pixel, add its costs to the sums, and return its least.
 
-    The casts keep every number in 16 bits, so that many disparities are computed at once.
+    The casts keep every number in 16 bits, so that many disparities are computed at once. Pixels are indexed, not cut
+    out: a cut of an array costs as much time as these sums.
     """
     jump = np.int16(low + large)
     least = BEYOND
-    for d in range(above.shape[2]):
-        step = np.int16(min(costs[path, before, u, d], costs[path, before, u, d + 2]) + small)
-        best = min(min(costs[path, before, u, d + 1], jump), step)
-        cost = np.int16(np.int16(best - low) + above[row, column, d])
-        costs[path, now, x, d + 1] = cost
-        sums[row, column, d] = np.int16(sums[row, column, d] + cost)
+    for d in range(above.shape[1]):
+        step = np.int16(min(before[other, d], before[other, d + 2]) + small)
+        best = min(min(before[other, d + 1], jump), step)
+        cost = np.int16(np.int16(best - low) + above[x, d])
+        now[own, d + 1] = cost
+        sums[x, d] = np.int16(sums[x, d] + cost)
         least = min(least, cost)
     return least

@@ -30,7 +30,7 @@ def last(costs: list[float], sums: list[float]) -> dict[str, float]:
         pytest.param([9] * 5, [5, 9, 2, 3, 4], "aggregated_margin", 2, id="neighbours of the winner are left out"),
         pytest.param([9] * 3, [5, 2, 3], "aggregated_margin", 40, id="there is no other minimum"),
         pytest.param([3, 5, 9, 0, 1], [9] * 5, "single_margin", 3, id="of the single costs' own winner"),
-        pytest.param([N, 5, 0, 1, N], [9] * 5, "single_margin", 40, id="cells without a cost are far"),
+        pytest.param([N, 5, 0, 1, N], [9] * 5, "single_margin", 4, id="cells without a cost are 4 above"),
         pytest.param([3, 1, 2], [0, 5, 5], "single_excess", 2, id="cost at the winner above the least"),
         pytest.param([3, 1, 2], [0, 5, 5], "single_cost", 3, id="cost at the winner"),
         pytest.param([-3, 1, 2], [0, 5, 5], "single_cost", -3, id="a negative cost"),

@@ -12,7 +12,7 @@ SIXTEEN = [*EIGHT, (1, 2), (-1, -2), (1, -2), (-1, 2), (2, 1), (-2, -1), (2, -1)
 
 
 def levels(costs: NDArray, d_min: int) -> list[list[list[int]]]:
-    """Return the cost of each cell above its pixel's least, in eighths, at most 320."""
+    """Return the cost of each cell above its pixel's least, in eighths, at most 320; without one 32."""
     height, width = costs.shape[:2]
     return [[_levels_of_pixel(costs[y, x], x, width, d_min) for x in range(width)] for y in range(height)]
 
@@ -22,7 +22,7 @@ def _levels_of_pixel(costs: NDArray, x: int, width: int, d_min: int) -> list[int
     known = [cost for cost in eighths if cost is not None]
     if not known:
         return [0] * len(costs)
-    above = [320 if cost is None else min(cost - min(known), 320) for cost in eighths]
+    above = [32 if cost is None else min(cost - min(known), 320) for cost in eighths]
     inside = [0 <= x - d - d_min < width for d in range(len(costs))]
     cells = [cost for cost, here in zip(above, inside, strict=True) if here]
     mean = (2 * sum(cells) + len(cells)) // (2 * len(cells)) if cells else None

@@ -21,7 +21,7 @@ def row(costs: list[list[float]], d_min: int, dtype: type = np.float16) -> tuple
         pytest.param([1, -2], [24, 0], -16, id="above the least, in eighths"),
         pytest.param([0, 0.1], [0, 1], 0, id="rounded"),
         pytest.param([0, 60], [0, 320], 0, id="at most 40"),
-        pytest.param([N, 3], [320, 0], 24, id="a cell without a cost"),
+        pytest.param([N, 3], [32, 0], 24, id="a cell without a cost"),
         pytest.param([N, N], [0, 0], NO_COST, id="a pixel without any cost says nothing"),
         pytest.param([I, 3], [320, 0], 24, id="infinity is the largest"),
         pytest.param([-I, 3], [0, 320], -16384, id="minus infinity is the least"),
@@ -40,7 +40,7 @@ def test_by_hand(costs: list[float], above: list[int], least: int, dtype: type) 
     [
         pytest.param(0, [[0, 0, 0], [16, 0, 8], [0, 16, 32]], id="at the left border"),
         pytest.param(-2, [[0, 16, 32], [16, 0, 32], [0, 0, 0]], id="at the right border"),
-        pytest.param(7, [[0, 16, 320], [16, 0, 320], [0, 16, 32]], id="no right pixel is in the image"),
+        pytest.param(7, [[0, 16, 32], [16, 0, 32], [0, 16, 32]], id="no right pixel is in the image"),
     ],
 )
 def test_a_cell_outside_the_image_has_the_mean_of_the_others(d_min: int, expected: list[list[int]]) -> None:
