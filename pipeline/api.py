@@ -17,6 +17,7 @@ from semidense.pipeline.execution.watch import Unwatched, Watch
 from semidense.pipeline.plan.config import Config, Settings, alternatives, setting_texts, value_text
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made, Plan, Planned, make_plan
+from semidense.pipeline.plan.presets import DEFAULT
 from semidense.pipeline.plan.ranges import close_ranges
 from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.plan.training_split import training_scenes
@@ -47,6 +48,7 @@ class Options(TypedDict, total=False):
     config: Path | str | None
     train: bool
     cache: Path | str | None
+    preset: str
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,7 @@ class Task:
         config: a TOML file.
         train: train the networks on the training scenes instead of taking the shipped weights.
         cache: the cache's folder.
+        preset: named settings to start from, ``paper`` or ``robust``; the file's and ``settings`` refine them.
     """
 
     dataset: Data = "motorcycle"
@@ -70,6 +73,7 @@ class Task:
     config: Path | str | None = None
     train: bool = False
     cache: Path | str | None = None
+    preset: str = DEFAULT
 
     def __post_init__(self) -> None:
         """Bring what may be typed in several ways into one form."""
@@ -86,12 +90,12 @@ class Task:
         return replace(self, settings=(*setting_texts(self.settings), *setting_texts(further)))
 
     def configuration(self) -> Config:
-        """Return the configuration that the file and the settings describe.
+        """Return the configuration that the preset, the file and the settings describe.
 
         Raises:
             UsageError: if one of them is not valid.
         """
-        return Config.load(Path(self.config) if self.config else None, setting_texts(self.settings))
+        return Config.load(Path(self.config) if self.config else None, setting_texts(self.settings), self.preset)
 
     def open(self) -> Dataset:
         """Return the dataset, narrowed to the scenes that are named.

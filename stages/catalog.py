@@ -9,7 +9,14 @@ from collections.abc import Iterable
 from importlib.metadata import EntryPoint, entry_points
 
 from semidense.stages.baselines.declaration import BASELINES
-from semidense.stages.disparity.declaration import DISPARITY, FILLED, REFINED, RIGHT_DISPARITY
+from semidense.stages.disparity.declaration import (
+    AGGREGATED,
+    DISPARITY,
+    FILLED,
+    REFINED,
+    RIGHT_AGGREGATED,
+    RIGHT_DISPARITY,
+)
 from semidense.stages.disparity.survey import SURVEY
 from semidense.stages.evaluation.calibration.declaration import CALIBRATED_CONFIDENCE, CALIBRATION
 from semidense.stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
@@ -31,6 +38,8 @@ CATALOG: tuple[Stage, ...] = (
     RIGHT_DISPARITY,
     DISTINCTIVENESS,
     COST_MARGIN,
+    AGGREGATED,
+    RIGHT_AGGREGATED,
     EVALUATION_SAMPLES,
     EVALUATION_NET,
     CONFIDENCE,

@@ -107,6 +107,8 @@ class Stage:
         sizes: of a tiled stage, the length of each dimension other than ``y`` and ``x``, from the
             parameters: its arrays exist before its first tile.
         monitored: long work, which reports progress and can resume.
+        section: the product whose section of the configuration it takes; empty: its own.
+        lazy: of a stage that is not tiled, inputs whose arrays come unread: slicing one reads that part of it.
         needs: distributions beside the core ones; their versions enter the key.
         learnt: its result is learnt from training scenes, and may come as a file of weights instead.
         cross_fitted: of a split stage: each training scene comes as networks of other scenes score it. Its settings
@@ -124,6 +126,8 @@ class Stage:
     border: Border = "cut"
     sizes: Callable[[Any], Mapping[str, int]] = lambda _: {}
     monitored: bool = False
+    section: str = ""
+    lazy: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     learnt: bool = False
     cross_fitted: bool = False

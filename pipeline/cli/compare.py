@@ -9,11 +9,13 @@ from semidense.pipeline.cli.options import (
     CacheOption,
     ConfigOption,
     JsonOption,
+    PresetOption,
     SceneOption,
     SchedulerOption,
     SetOption,
     WorkersOption,
 )
+from semidense.pipeline.plan.presets import DEFAULT
 
 
 def register(app: typer.Typer) -> None:
@@ -53,6 +55,7 @@ def compare(
         float, typer.Option("--threshold", help="Error in px above which tables and figures call a pixel wrong.")
     ] = 1.0,
     settings: SetOption = None,
+    preset: PresetOption = DEFAULT,
     config: ConfigOption = None,
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Where comparison.csv, comparison.json and the figures go.")
@@ -78,7 +81,7 @@ def compare(
     if threshold not in THRESHOLDS:
         offered = ", ".join(f"{each:g}" for each in THRESHOLDS)
         raise UsageError(f"--threshold {threshold:g}: figures are worked out for {offered} px")
-    task = api.Task(dataset, tuple(scene or ()), tuple(settings or ()), config, False, cache)
+    task = api.Task(dataset, tuple(scene or ()), tuple(settings or ()), config, False, cache, preset)
     experiments = experiment or comparison.EXPERIMENTS
     with ProgressWatch() as watch:
         found = comparison.compare(

@@ -70,6 +70,9 @@ def print_explanation(found: Mapping[str, Any], graph: Path | None = None) -> No
     """Print the ingredients, a line each, code as module and the first digits of its hash; and what was drawn."""
     console = Console(highlight=False, soft_wrap=True)
     console.print(f"{found['product']} of {found['scene']}: {found['state']}", style="bold", markup=False)
+    if "preset" in found:
+        settings = " ".join(found["preset"]["settings"]) or "the defaults"
+        console.print(f"preset  {found['preset']['name']}: {settings}", markup=False)
     console.print(f"key     {found['key'] or 'open until its inputs are made'}")
     if "digest" in found:
         made = f"made {found['created']} in {found['seconds']:.2f} s, {found['bytes']:,} bytes"

@@ -12,10 +12,12 @@ from semidense.pipeline.cli.options import (
     ConfigOption,
     DryRunOption,
     JsonOption,
+    PresetOption,
     SchedulerOption,
     SetOption,
     WorkersOption,
 )
+from semidense.pipeline.plan.presets import DEFAULT
 
 if TYPE_CHECKING:
     from semidense.pipeline.api import Task
@@ -70,6 +72,7 @@ def match(
         list[str] | None, typer.Option("--scene", help="Only this pair of several; may be repeated.")
     ] = None,
     settings: SetOption = None,
+    preset: PresetOption = DEFAULT,
     config: ConfigOption = None,
     dry_run: DryRunOption = False,
     scheduler: SchedulerOption = None,
@@ -87,7 +90,7 @@ def match(
 
     options = PairOptions(tuple(calib or ()), unit, min_disp, max_disp, split)
     sides = [left] if right is None else [left, right]
-    task = Task(pair_spec(sides, options), tuple(scene or ()), tuple(settings or ()), config, False, cache)
+    task = Task(pair_spec(sides, options), tuple(scene or ()), tuple(settings or ()), config, False, cache, preset)
     wishes = Wishes(
         R=threshold,
         density=_share("density", density),

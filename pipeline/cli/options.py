@@ -8,6 +8,13 @@ import typer
 DatasetArgument = Annotated[str, typer.Argument(help="Such as motorcycle or middlebury:DIR; see `pipeline data list`.")]
 SceneOption = Annotated[list[str] | None, typer.Option("--scene", help="Only this scene; may be repeated.")]
 SetOption = Annotated[list[str] | None, typer.Option("--set", help="section.field=value; may be repeated.")]
+PresetOption = Annotated[
+    str,
+    typer.Option(
+        "--preset",
+        help="Settings to start from: paper, or robust: fewer wrong pixels where texture is thin.",
+    ),
+]
 ConfigOption = Annotated[Path | None, typer.Option("--config", help="A TOML file with the same sections.")]
 CacheOption = Annotated[
     Path | None, typer.Option("--cache", help="The cache's folder [default: $PIPELINE_CACHE, else the user's].")

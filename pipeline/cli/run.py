@@ -13,6 +13,7 @@ from semidense.pipeline.cli.options import (
     ForceOption,
     JsonOption,
     OutputOption,
+    PresetOption,
     ProductArgument,
     SceneOption,
     SchedulerOption,
@@ -21,6 +22,7 @@ from semidense.pipeline.cli.options import (
     UptoOption,
     WorkersOption,
 )
+from semidense.pipeline.plan.presets import DEFAULT
 
 if TYPE_CHECKING:
     from semidense.pipeline.api import Task
@@ -39,6 +41,7 @@ def run(
     upto: UptoOption = "metrics",
     scene: SceneOption = None,
     settings: SetOption = None,
+    preset: PresetOption = DEFAULT,
     config: ConfigOption = None,
     train: TrainOption = False,
     dry_run: DryRunOption = False,
@@ -54,7 +57,7 @@ def run(
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
 
-    task = _task(dataset, scene, settings, config, train, cache)
+    task = _task(dataset, scene, settings, config, train, cache, preset)
     if dry_run:
         return _print_plan(api.status(task, upto, forced=force or ()), as_json)
     with ProgressWatch() as watch:
@@ -75,6 +78,7 @@ def sweep(
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="section.field=value1,value2; all combinations are made.")
     ] = None,
+    preset: PresetOption = DEFAULT,
     config: ConfigOption = None,
     train: TrainOption = False,
     output: Annotated[Path, typer.Option("--output", "-o", help="Where sweep.csv and sweep.png go.")] = Path("sweep"),
@@ -92,7 +96,7 @@ def sweep(
     from semidense.pipeline.execution.progress import ProgressWatch
     from semidense.pipeline.files.run_files import write_sweep
 
-    task = _task(dataset, scene, None, config, train, cache)
+    task = _task(dataset, scene, None, config, train, cache, preset)
     with ProgressWatch() as watch:
         result = api.sweep(task, thresholds, settings or (), watch=watch, scheduler=scheduler, workers=workers)
     files = write_sweep(result.metrics, output)
@@ -110,6 +114,7 @@ def status(
     upto: UptoOption = "metrics",
     scene: SceneOption = None,
     settings: SetOption = None,
+    preset: PresetOption = DEFAULT,
     config: ConfigOption = None,
     train: TrainOption = False,
     cache: CacheOption = None,
@@ -118,7 +123,7 @@ def status(
     """Say what is cached, and what changed if it is not."""
     from semidense.pipeline import api
 
-    _print_plan(api.status(_task(dataset, scene, settings, config, train, cache), upto), as_json)
+    _print_plan(api.status(_task(dataset, scene, settings, config, train, cache, preset), upto), as_json)
 
 
 def explain(
@@ -126,6 +131,7 @@ def explain(
     dataset: DatasetArgument = "motorcycle",
     scene: SceneOption = None,
     settings: SetOption = None,
+    preset: PresetOption = DEFAULT,
     config: ConfigOption = None,
     train: TrainOption = False,
     graph: Annotated[Path | None, typer.Option("--graph", help="Draw what it was made from (SVG, PNG, PDF).")] = None,
@@ -138,9 +144,11 @@ def explain(
     """
     from semidense.pipeline import api
     from semidense.pipeline.cli.explain import draw_provenance, explanation, print_explanation
+    from semidense.pipeline.plan.config import preset_settings
 
-    planned = api.explain(_task(dataset, scene, settings, config, train, cache), product)
+    planned = api.explain(_task(dataset, scene, settings, config, train, cache, preset), product)
     found = explanation(planned, api.open_store(cache))
+    found |= {"preset": {"name": preset, "settings": list(preset_settings(preset))}}
     if graph:
         draw_provenance(planned, api.open_store(cache), graph)
     if as_json:
@@ -159,6 +167,7 @@ def inspect(
     pixel: Annotated[str | None, typer.Option("--pixel", help="Y,X: whose cost curve to draw.")] = None,
     disparity: Annotated[int | None, typer.Option("--disparity", help="Which cost slice to draw, px.")] = None,
     settings: SetOption = None,
+    preset: PresetOption = DEFAULT,
     config: ConfigOption = None,
     train: TrainOption = False,
     cache: CacheOption = None,
@@ -171,7 +180,7 @@ def inspect(
     from semidense.pipeline import api
     from semidense.pipeline.cli.inspect import draw, inspection, print_inspection
 
-    planned = api.explain(_task(dataset, scene, settings, config, train, cache), product)
+    planned = api.explain(_task(dataset, scene, settings, config, train, cache, preset), product)
     found = inspection(planned, api.open_store(cache))
     if png:
         draw(found, png, pixel, disparity)
@@ -185,10 +194,11 @@ def _task(
     config: Path | None,
     train: bool,
     cache: Path | None,
+    preset: str,
 ) -> "Task":
     from semidense.pipeline.api import Task
 
-    return Task(dataset, tuple(scenes or ()), tuple(settings or ()), config, train, cache)
+    return Task(dataset, tuple(scenes or ()), tuple(settings or ()), config, train, cache, preset)
 
 
 def _print_plan(plan: "Plan", as_json: bool) -> None:

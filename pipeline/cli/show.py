@@ -13,9 +13,11 @@ from semidense.pipeline.cli.options import (
     ConfigOption,
     DatasetArgument,
     JsonOption,
+    PresetOption,
     SceneOption,
     SetOption,
 )
+from semidense.pipeline.plan.presets import DEFAULT
 
 
 def register(app: typer.Typer) -> None:
@@ -32,6 +34,7 @@ def report(
     output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path("report.html"),
     scene: SceneOption = None,
     settings: SetOption = None,
+    preset: PresetOption = DEFAULT,
     config: ConfigOption = None,
     train: Annotated[bool, typer.Option("--train", help="Of a run that trained the networks.")] = False,
     cache: CacheOption = None,
@@ -43,7 +46,7 @@ def report(
     from semidense.pipeline.api import Task
     from semidense.pipeline.pages.report import report as write
 
-    path = write(Task(dataset, tuple(scene or ()), tuple(settings or ()), config, train, cache), output)
+    path = write(Task(dataset, tuple(scene or ()), tuple(settings or ()), config, train, cache, preset), output)
     typer.echo(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
 
 

@@ -232,8 +232,12 @@ def provenance(command: Sequence[str]) -> dict[str, Any]:
     return {"versions": {name: version(name) for name in VERSIONS}, "command": list(command)}
 
 
-def _read_whole(context: Context, step: Step, product: str, keys: Sequence[str]) -> Arrays | Sequence[Arrays]:
-    """Return a product's arrays; where a split step takes one a scene, a list."""
+def _read_whole(
+    context: Context, step: Step, product: str, keys: Sequence[str]
+) -> Mapping[str, Any] | Sequence[Arrays]:
+    """Return a product's arrays, unread if the stage asks for it; where a split step takes one a scene, a list."""
+    if product in step.stage.lazy:
+        return context.store.arrays(keys[0])
     arrays = [context.recent.read(context.store, key) for key in keys]
     return arrays if step.takes_list(product) else arrays[0]
 

@@ -18,6 +18,7 @@ from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import findings
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made
+from semidense.pipeline.plan.presets import DEFAULT
 from semidense.pipeline.plan.steps import SPLIT
 from semidense.pipeline.results.result import Result
 from semidense.stages.disparity import depth as geometry
@@ -242,6 +243,7 @@ def match(
     calib: str | PathLike[str] | Sequence[str | PathLike[str]] = (),
     unit: Unit | None = None,
     settings: Sequence[str] = (),
+    preset: str = DEFAULT,
     cache: Path | str | None = None,
     watch: Watch | None = None,
     workers: int | None = None,
@@ -256,7 +258,8 @@ def match(
         d_max: largest one.
         calib: a calibration file, or a left and a right one of ROS; ``docs/own-pictures.md`` lists the formats.
         unit: of a calibration that does not tell it, such as OpenCV's.
-        settings: ``section.field=value`` of the configuration.
+        settings: settings of the configuration, over those of the preset.
+        preset: named settings to start from, ``paper`` or ``robust``.
         cache: the cache's folder.
         watch: told how it goes on.
         workers: threads; None for one a core.
@@ -267,7 +270,7 @@ def match(
     """
     files = [calib] if isinstance(calib, str | PathLike) else calib
     options = PairOptions(tuple(fspath(file) for file in files), unit, d_min, d_max)
-    task = Task(_dataset(left, right, options), settings=tuple(settings), cache=cache)
+    task = Task(_dataset(left, right, options), settings=tuple(settings), cache=cache, preset=preset)
     found = match_all(task, Wishes(**wishes), watch=watch, workers=workers)
     if len(found) != 1:
         raise UsageError(f"{left} and {right} are {len(found)} pairs; match one at a time, or use `pipeline match`")

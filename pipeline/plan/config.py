@@ -1,7 +1,7 @@
 """The configuration: one section a product, every field with its range and default.
 
 The sections are those of the stages' own ``Params``, of stages from other packages too. Sources, later ones win: the
-defaults, a TOML file, ``section.field=value`` settings.
+defaults, a preset, a TOML file, ``section.field=value`` settings.
 """
 
 import difflib
@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from semidense.pipeline.plan import presets
 from semidense.pipeline.plan.errors import UsageError
 from semidense.stages.catalog import STAGES
 from semidense.stages.stage import NoParams, Params
@@ -79,8 +80,8 @@ class Config(BaseModel):
         }
 
     @staticmethod
-    def load(file: Path | None = None, settings: Iterable[str] = ()) -> "Config":
-        """Return the configuration that a TOML file and ``section.field=value`` settings describe.
+    def load(file: Path | None = None, settings: Iterable[str] = (), preset: str = presets.DEFAULT) -> "Config":
+        """Return the configuration that a preset, a TOML file and ``section.field=value`` settings describe.
 
         Raises:
             UsageError: if the file cannot be read, a name is unknown (the nearest is given) or a value
@@ -88,6 +89,8 @@ class Config(BaseModel):
         """
         tree = _read_toml(file) if file else {}
         model = _model(tuple(STAGES))
+        for setting in preset_settings(preset):
+            _merge(tree, setting, model, over=False)
         for setting in settings:
             _merge(tree, setting, model)
         _refuse_unknown(tree, model)
@@ -101,7 +104,7 @@ class Config(BaseModel):
 def _model(products: tuple[str, ...]) -> type[Config]:
     """Return the model with a section for each of the products that has settings, and the sections of choices."""
     stages = [STAGES[product] for product in products]
-    sections = {stage.product: stage.params for stage in stages if stage.params is not NoParams}
+    sections = {stage.product: stage.params for stage in stages if stage.params is not NoParams and not stage.section}
     sections["weights"] = _choices("weights", [stage.product for stage in stages if stage.learnt])
     sections["use"] = _choices("use", products)
     fields: dict[str, Any] = {name: (kind, kind()) for name, kind in sections.items()}
@@ -180,11 +183,24 @@ def parse_setting(setting: str) -> tuple[str, str, str]:
     return section, field, value.strip()
 
 
-def _merge(tree: dict[str, Any], setting: str, model: type[Config]) -> None:
-    section, field, value = parse_setting(setting)
+def preset_settings(preset: str) -> tuple[str, ...]:
+    """Return the settings of a preset that differ from the defaults.
+
+    Raises:
+        UsageError: if there is no preset of that name.
+    """
+    if preset not in presets.PRESETS:
+        raise UsageError(f"no preset {preset!r}; {nearest(preset, presets.PRESETS)}")
+    return presets.PRESETS[preset]
+
+
+def _merge(tree: dict[str, Any], setting: str, model: type[Config], over: bool = True) -> None:
+    """Put a setting into the tree; unless ``over``, only where the tree has none."""
+    section, field, text = parse_setting(setting)
     if not isinstance(tree.setdefault(section, {}), dict):
         raise UsageError(f"configuration: [{section}] must be a table of fields")
-    tree[section][field] = parse_value(value, several="tuple" in str(_annotation(model, section, field)))
+    if over or field not in tree[section]:
+        tree[section][field] = parse_value(text, several="tuple" in str(_annotation(model, section, field)))
 
 
 def _annotation(model: type[Config], section: str, field: str) -> object:

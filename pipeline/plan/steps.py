@@ -288,7 +288,7 @@ class _Builder:
         if missing or stage.scope != own.scope or (other != product and product in made_from(other)):
             why = f"it has no array {missing[0]!r} with its dimensions" if missing else f"it is made from {product}"
             raise UsageError(f"use.{product} = {other!r}: {other} cannot take the place of {product}, {why}")
-        return replace(stage, product=product), self.config.section(other)
+        return replace(stage, product=product), self.config.section(stage.section or other)
 
     def _inputs(self, stage: Stage, product: str, scene: SceneSource | None) -> tuple[str, ...]:
         if stage.scope == "split" and _scope(product) == "scene":

@@ -1,6 +1,8 @@
 """Declare the disparity maps of both views and what follows them: refinement and filling. Loads no numba."""
 
-from pydantic import Field
+from typing import Literal
+
+from pydantic import Field, model_validator
 
 from semidense.stages.stage import Output, Params, Stage
 
@@ -24,6 +26,29 @@ DISPARITY = Stage(
 )
 """The raw disparity. ``costvolume`` has ``cost`` (y, x, d) float16 and its coordinate ``d`` (d,) int16, px. A tile has
 the rows of one chunk of the volume, so that each chunk is read once."""
+
+
+class AggregatedParams(Params):
+    """How costs are summed along paths, and how a disparity is read off the sums."""
+
+    paths: Literal[8, 16] = Field(8, description="directions that costs are summed along")
+    p1: float = Field(
+        16, ge=0, le=400, description="penalty of a step of 1 px along a path, log-odds; larger: smoother surfaces"
+    )
+    p2: float = Field(
+        128, ge=0, le=400, description="penalty of a larger step, log-odds; larger: fewer jumps and fewer small objects"
+    )
+    edge_step: int = Field(
+        6, ge=0, le=255, description="pixels whose gray differs by more levels of 255 have an edge between them"
+    )
+    edge_divisor: float = Field(4, ge=1, le=1000, description="both penalties are divided by it at an edge")
+    subpixel: bool = Field(True, description="refine by a parabola through three summed costs")
+
+    @model_validator(mode="after")
+    def _rising(self) -> "AggregatedParams":
+        if self.p2 < self.p1:
+            raise ValueError(f"p2 {self.p2:g} must be at least p1 {self.p1:g}")
+        return self
 
 
 class RefinedParams(Params):
@@ -52,6 +77,38 @@ RIGHT_DISPARITY = Stage(
     tile_rows=32,
 )
 """The right view's raw disparity, from the same cost volume. A tile has the rows of one chunk of the volume."""
+
+_EVIDENCE = Output(
+    "evidence", ("feature", "y", "x"), "float16", "1", "what the costs say of each pixel; NaN: no disparity", {"y": 256}
+)
+
+AGGREGATED = Stage(
+    product="aggregated",
+    inputs=("images", "costvolume"),
+    outputs=(
+        Output("disparity", ("y", "x"), "float32", "px", "disparity of the left view by costs summed along paths"),
+        _EVIDENCE,
+    ),
+    compute="semidense.stages.disparity.aggregation.stage:compute_aggregated",
+    params=AggregatedParams,
+    lazy=("costvolume",),
+)
+"""The left view's disparity of least aggregated cost, and what the costs say of it. ``use.disparity=aggregated`` puts
+it in the place of ``disparity``. Not tiled: paths run over the whole image; the volume is read in strips."""
+
+RIGHT_AGGREGATED = Stage(
+    product="right_aggregated",
+    inputs=("images", "costvolume"),
+    outputs=(
+        Output("disparity", ("y", "x"), "float32", "px", "disparity of the right view by costs summed along paths"),
+        _EVIDENCE,
+    ),
+    compute="semidense.stages.disparity.aggregation.stage:compute_right_aggregated",
+    params=AggregatedParams,
+    section="aggregated",
+    lazy=("costvolume",),
+)
+"""The same of the right view, from the same volume; ``use.right_disparity=right_aggregated``."""
 
 REFINED = Stage(
     product="refined",

@@ -16,6 +16,9 @@ from semidense.pipeline.api import Task
 from semidense.pipeline.execution.scheduler import totals
 from semidense.pipeline.results.result import Result
 from semidense.stages.catalog import STAGES
+from semidense.stages.disparity.aggregation.stage import compute_aggregated, compute_right_aggregated
+from semidense.stages.disparity.declaration import AggregatedParams
+from tests.stages.tiling import same
 from tests.tiny import PATH
 
 Invoke = Callable[..., Any]
@@ -166,3 +169,26 @@ def test_nothing_is_left_in_drafts_or_checkpoints(trained: Result) -> None:
         path for folder in ("drafts", "checkpoints") if (root / folder).is_dir() for path in (root / folder).iterdir()
     ]
     assert left == []
+
+
+def test_aggregated_maps_take_the_place_of_both_views_maps(own_task: Task) -> None:
+    settings = (
+        *own_task.settings,
+        "use.disparity=aggregated",
+        "use.right_disparity=right_aggregated",
+        "refined.left_right=true",
+        "aggregated.p1=2",
+        "aggregated.p2=9",
+    )
+    result = api.run(replace(own_task, settings=settings), "refined")
+    arrays = {name: result.store.read(result.find(name, "test-0").key) for name in ("images", "costvolume")}
+    params = AggregatedParams(p1=2, p2=9)
+    for product, compute in (("disparity", compute_aggregated), ("right_disparity", compute_right_aggregated)):
+        assert same(result.store.read(result.find(product, "test-0").key), compute(params, arrays))
+
+
+def test_a_sweep_over_penalties_makes_the_volume_once(own_task: Task) -> None:
+    settings = (*own_task.settings, "use.disparity=aggregated")
+    result = api.sweep(replace(own_task, settings=settings), "0.5", ["aggregated.p1=1,2,4"])
+    assert made(result)["disparity"] == 9, "three scenes, three penalties"
+    assert "costvolume" not in made(result)

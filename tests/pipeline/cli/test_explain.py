@@ -55,3 +55,11 @@ def test_long_hashes_are_cut_and_many_are_counted(
     assert "  images = abababababab and 28 more" in lines
     own = lines[: lines.index("made from")]
     assert max(len(line) for line in own if "key " not in line and "digest" not in line) < 100
+
+
+def test_the_preset_is_told_with_its_settings(
+    trained: Result, trained_task: Task, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = explanation(explain(trained_task, "disparity"), trained.store)
+    print_explanation(found | {"preset": {"name": "robust", "settings": ["a.b=1", "c.d=2"]}})
+    assert "preset  robust: a.b=1 c.d=2" in capsys.readouterr().out.splitlines()

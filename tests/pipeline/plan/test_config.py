@@ -17,7 +17,7 @@ def test_defaults_stand_when_nothing_is_set() -> None:
 
 @pytest.mark.parametrize("stage", CATALOG, ids=lambda stage: stage.product)
 def test_every_product_has_the_section_its_stage_declares(stage: Stage) -> None:
-    assert type(Config.load().section(stage.product)) is stage.params
+    assert type(Config.load().section(stage.section or stage.product)) is stage.params
 
 
 def test_a_product_without_settings_has_an_empty_section() -> None:

@@ -1,0 +1,20 @@
+"""Named sets of settings to start from; a file's and single settings refine them."""
+
+from collections.abc import Mapping
+
+PRESETS: Mapping[str, tuple[str, ...]] = {
+    "paper": (),
+    "robust": (
+        "costvolume.mode=fast",
+        "use.disparity=aggregated",
+        "use.right_disparity=right_aggregated",
+    ),
+}
+"""The settings of each preset that differ from the defaults.
+
+- ``paper``: the method of the paper: single costs, winner takes all, whole disparities.
+- ``robust``: costs summed along paths before the winner is taken, with sub-pixel disparities: fewer wrong pixels where
+  texture is thin.
+"""
+DEFAULT = "paper"
+"""The preset of a command that is given none."""

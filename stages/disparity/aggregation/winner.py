@@ -1,0 +1,82 @@
+"""The disparity of least aggregated cost, among the cells whose right pixel is in the image."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semidense.stages.compute.kernel import kernel
+from semidense.stages.disparity.aggregation.levels import NO_COST, ends
+from semidense.stages.disparity.aggregation.strips import Strip
+
+NONE = -1
+"""The index of a pixel that has no winner."""
+
+
+def winner(strip: Strip) -> NDArray[np.int32]:
+    """Return the index of the least aggregated cost of each pixel; of equal costs the smallest disparity wins.
+
+    Only cells whose right pixel, ``x - d``, is in the image can win; one without a cost of its own (not judged in a
+    guided volume) can, by its neighbours'.
+
+    Returns:
+        (y, x) int32 index on the last axis; ``NONE`` where a pixel has no such cell or no cost at all.
+    """
+    index = np.empty(strip.aggregated.shape[:2], np.int32)
+    _least(strip.aggregated, strip.single.least, strip.single.d_min, index)
+    return index
+
+
+def parabola(strip: Strip, index: NDArray[np.int32]) -> NDArray[np.float32]:
+    """Return how far the lowest point of the parabola through the winner and its neighbours lies from it.
+
+    ``(S(d - 1) - S(d + 1)) / (2 (S(d - 1) - 2 S(d) + S(d + 1)))`` of the aggregated costs ``S``.
+
+    Returns:
+        (y, x) float32 in [-0.5, 0.5] px; 0 at an end of the range or of the image, and where the three do not bend.
+    """
+    shift = np.zeros(index.shape, np.float32)
+    _shift(strip.aggregated, index, strip.single.d_min, shift)
+    return shift
+
+
+@kernel
+def first_least(costs: NDArray[Any], first: int, end: int) -> int:
+    """Return the index of the first least of some costs; there must be one at least."""
+    low = costs[first]
+    for d in range(first, end):
+        low = min(low, costs[d])
+    best = first
+    while costs[best] != low:
+        best += 1
+    return best
+
+
+@kernel
+def _least(aggregated: NDArray[np.uint16], least: NDArray[np.int16], d_min: int, index: NDArray[np.int32]) -> None:
+    """Write the index of each pixel's winner."""
+    height, width, depth = aggregated.shape
+    for y in range(height):
+        for x in range(width):
+            first, end = ends(x, width, d_min, depth)
+            found = first < end and least[y, x] != NO_COST
+            index[y, x] = first_least(aggregated[y, x], first, end) if found else NONE
+
+
+@kernel
+def _shift(aggregated: NDArray[np.uint16], index: NDArray[np.int32], d_min: int, shift: NDArray[np.float32]) -> None:
+    """Write the shift of each pixel that has a winner with two neighbours."""
+    height, width, depth = aggregated.shape
+    for y in range(height):
+        for x in range(width):
+            first, end = ends(x, width, d_min, depth)
+            d = index[y, x]
+            if first < d < end - 1:
+                before, here, after = (
+                    np.int64(aggregated[y, x, d - 1]),
+                    np.int64(aggregated[y, x, d]),
+                    np.int64(aggregated[y, x, d + 1]),
+                )
+                bend = before - 2 * here + after
+                if bend > 0:  # the winner is the least, so the lowest point is at most half a pixel away
+                    shift[y, x] = (before - after) / (2 * bend)

@@ -1,0 +1,61 @@
+"""Aggregation as the equation says it: one pixel, one path and one disparity at a time, in Python's own numbers."""
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semidense.stages.disparity.declaration import AggregatedParams
+
+EIGHT = [(0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, -1), (1, -1), (-1, 1)]
+SIXTEEN = [*EIGHT, (1, 2), (-1, -2), (1, -2), (-1, 2), (2, 1), (-2, -1), (2, -1), (-2, 1)]
+
+
+def levels(costs: NDArray, d_min: int) -> list[list[list[int]]]:
+    """Return the cost of each cell above its pixel's least, in eighths, at most 320; without one 32."""
+    height, width = costs.shape[:2]
+    return [[_levels_of_pixel(costs[y, x], x, width, d_min) for x in range(width)] for y in range(height)]
+
+
+def _levels_of_pixel(costs: NDArray, x: int, width: int, d_min: int) -> list[int]:
+    eighths = [None if np.isnan(cost) else round(float(np.float16(cost)) * 8) for cost in costs]
+    known = [cost for cost in eighths if cost is not None]
+    if not known:
+        return [0] * len(costs)
+    above = [32 if cost is None else min(cost - min(known), 320) for cost in eighths]
+    inside = [0 <= x - d - d_min < width for d in range(len(costs))]
+    cells = [cost for cost, here in zip(above, inside, strict=True) if here]
+    mean = (2 * sum(cells) + len(cells)) // (2 * len(cells)) if cells else None
+    return [cost if here or mean is None else mean for cost, here in zip(above, inside, strict=True)]
+
+
+def sums(costs: NDArray, gray: NDArray, d_min: int, params: AggregatedParams) -> NDArray[np.int64]:
+    """Return the sum of all path costs, (y, x, d)."""
+    height, width, depth = costs.shape
+    cost = levels(costs, d_min)
+    total = np.zeros(costs.shape, np.int64)
+    for dy, dx in SIXTEEN if params.paths == 16 else EIGHT:
+
+        @cache
+        def path(y: int, x: int, dy: int = dy, dx: int = dx) -> list[int]:
+            v, u = y - dy, x - dx
+            if not (0 <= v < height and 0 <= u < width):
+                return cost[y][x]
+            before = path(v, u, dy, dx)
+            edge = abs(int(gray[y, x]) - int(gray[v, u])) > params.edge_step
+            p1, p2 = (round(8 * p / (params.edge_divisor if edge else 1)) for p in (params.p1, params.p2))
+            low = min(before)
+            return [
+                cost[y][x][d]
+                + min(
+                    before[d],
+                    before[d - 1] + p1 if d > 0 else low + p2,
+                    before[d + 1] + p1 if d + 1 < depth else low + p2,
+                    low + p2,
+                )
+                - low
+                for d in range(depth)
+            ]
+
+        total += np.array([[path(y, x, dy, dx) for x in range(width)] for y in range(height)])
+    return total
