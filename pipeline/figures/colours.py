@@ -14,7 +14,7 @@ from matplotlib.colors import Colormap, ListedColormap
 from numpy.typing import NDArray
 
 from semidense.pipeline.plan.errors import UsageError
-from semidense.stages.metrics import THRESHOLDS
+from semidense.stages.metrics.errors import THRESHOLDS
 
 NONE = "#000000"
 """A pixel without a value."""

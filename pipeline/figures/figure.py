@@ -55,6 +55,7 @@ _DRAW: Mapping[str, Callable[..., None]] = {
     "right_disparity": draw_disparity,
     "refined": draw_disparity,
     "filled": draw_disparity,
+    "ranking": draw_metrics,
     "metrics": draw_metrics,
     **dict.fromkeys(("sgm", "census", "sncc", "mc_cnn", "mc_cnn_accurate"), draw_disparity),
     **dict.fromkeys(("o1", "ccnn"), draw_confidence),

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.cache import Store
-from semidense.pipeline.pages.tally import Block, Tally
 from semidense.pipeline.plan.images_and_truth import MASK_KINDS
+from semidense.stages.metrics.tally import Block, Tally
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ import math
 from typing import TYPE_CHECKING
 
 from semidense.cache import Store
+from semidense.pipeline.results.metric_rows import FIGURES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -13,7 +14,7 @@ def open_product(store: Store, key: str) -> "xr.Dataset":
     """Return a cached product as a lazy dataset.
 
     Rows and columns get coordinates in px. Beside ``cost``, the log-odds of a mismatch, a cost volume
-    offers its ``probability``. Each figure of ``metrics`` is an array of its own.
+    offers its ``probability``. Each figure of ``metrics`` and ``ranking`` is an array of its own.
 
     Raises:
         CacheError: if the entry is missing or damaged.
@@ -30,12 +31,16 @@ def open_product(store: Store, key: str) -> "xr.Dataset":
 
 
 def _with_named_figures(dataset: "xr.Dataset") -> "xr.Dataset":
-    """Return the product ``metrics`` with an array (mask, threshold) for each figure."""
-    from semidense.stages.metrics.stage import FIGURES, MASKS, THRESHOLDS, by_name
+    """Return the product ``metrics`` or ``ranking`` with an array (mask, threshold) for each figure."""
+    from semidense.stages.metrics.errors import MASKS, THRESHOLDS
+    from semidense.stages.metrics.ranking import RANKED
+    from semidense.stages.metrics.stage import FIGURES as NAMES
+    from semidense.stages.metrics.stage import by_name
 
+    names = RANKED if dataset.attrs["stage"] == "ranking" else NAMES
     named = {
-        name: (("mask", "threshold"), values, {"units": FIGURES[name][1], "long_name": FIGURES[name][2]})
-        for name, values in by_name(dataset["figures"].values).items()
+        name: (("mask", "threshold"), values, {"units": FIGURES[name].unit, "long_name": FIGURES[name].meaning})
+        for name, values in by_name(dataset["figures"].values, names).items()
     }
     return (
         dataset.drop_vars("figures")

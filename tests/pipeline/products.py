@@ -7,7 +7,9 @@ import xarray as xr
 
 from semidense.stages.evaluation.calibration.declaration import BINS
 from semidense.stages.evaluation.calibration.table import EDGES, probability
-from semidense.stages.metrics.stage import FIGURES, THRESHOLDS
+from semidense.stages.metrics.errors import THRESHOLDS
+from semidense.stages.metrics.ranking import RANKED
+from semidense.stages.metrics.stage import FIGURES
 
 N = np.nan
 DISPARITY = np.array(
@@ -117,6 +119,10 @@ def metrics() -> xr.Dataset:
     return xr.Dataset(figures, coords={"threshold": list(THRESHOLDS)})
 
 
+def ranking() -> xr.Dataset:
+    return metrics()[list(RANKED)]
+
+
 def survey() -> xr.Dataset:
     matches = np.array([[1, 4, 2, 0], [2, 3, 1, 0], [2, 4, 2, 1]], np.float32)
     return xr.Dataset(
@@ -160,5 +166,6 @@ PRODUCTS: dict[str, Callable[[], xr.Dataset]] = {
     "right_disparity": disparity,
     "refined": disparity,
     "filled": disparity,
+    "ranking": ranking,
     "metrics": metrics,
 }
