@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from semidense.cache import Change
+from semidense.cache.keys.recipe import short
 from semidense.pipeline.execution.scheduler import totals
 from semidense.pipeline.plan.causes import PENDING
 from semidense.pipeline.plan.plan import Made, Plan, Planned
@@ -55,7 +56,7 @@ def print_plan(plan: Plan) -> None:
     for planned in plan.steps:
         state = f"[{STYLES[planned.state]}]{planned.state}[/]"
         scene, reason = escape(planned.step.scene), escape(why(planned))
-        table.add_row(planned.step.product, scene, state, (planned.key or "")[:12], reason)
+        table.add_row(planned.step.product, scene, state, short(planned.key or ""), reason)
     console = results()
     console.print(table)
     print_notes(plan.notes)

@@ -7,13 +7,13 @@ from typing import Any
 
 from semidense.cache import Entry, Store
 from semidense.pipeline.api import Task, open_store, status
-from semidense.pipeline.files.selection import lineage
 from semidense.pipeline.pages.report.baselines import cached_baselines, compared_rows
 from semidense.pipeline.pages.scene_maps import SceneMaps
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Plan, Planned
 from semidense.pipeline.plan.steps import NETS, SPLIT
 from semidense.pipeline.results.metric_rows import METHOD
+from semidense.pipeline.results.provenance import lineage
 from semidense.stages.evaluation.filtering import SemidenseParams
 from semidense.stages.metrics.stage import metric_rows
 

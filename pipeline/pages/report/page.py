@@ -25,6 +25,7 @@ from semidense.pipeline.pages.report.graph import graph, steps_table
 from semidense.pipeline.pages.report.networks import networks
 from semidense.pipeline.pages.report.pictures import svg
 from semidense.pipeline.results.metric_rows import FIGURES, averaged
+from semidense.pipeline.results.text import time_text
 from semidense.stages.metrics.tally import Tally
 
 _CURVE = tuple(percent / 100 for percent in range(0, 100, 5))
@@ -189,4 +190,4 @@ def _keys(found: Gathered) -> Html:
 
 
 def _made(found: Gathered, key: str) -> str:
-    return found.entries[key].created[:19].replace("T", " ")
+    return time_text(found.entries[key].created)
