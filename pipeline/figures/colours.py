@@ -30,6 +30,22 @@ QUIET = "#B0B0B0"
 _CLIPPED = 0.5
 
 
+def view_rgb(view: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return a view of the pair as 8-bit colours, to look at.
+
+    Args:
+        view: (..., band) uint8 or uint16, one band or three; 16 bits are divided by 257, to the nearest whole number.
+
+    Returns:
+        (..., 3) uint8 RGB.
+
+    >>> view_rgb(np.array([[[0], [128], [129], [65535]]], np.uint16))[0, :, 0].tolist()
+    [0, 0, 1, 255]
+    """
+    eight = ((view.astype(np.uint32) + 128) // 257).astype(np.uint8) if view.dtype == np.uint16 else view
+    return np.broadcast_to(eight, (*eight.shape[:-1], 3))
+
+
 @cache
 def disparity_colours() -> Colormap:
     """Return the colours of disparities: near is yellow, far is blue, none is black."""

@@ -46,12 +46,13 @@ def test_share_of_nothing_is_0() -> None:
     assert share_patch(np.zeros(0, bool), "none", "black").get_label() == "none: 0.0 %"
 
 
-def test_gray_images_of_16_bits_keep_their_scale() -> None:
-    dataset = products.images().isel(band=slice(0, 1))
-    dataset = dataset.assign(left=dataset["left"].astype(np.uint16), right=dataset["right"].astype(np.uint16))
+@pytest.mark.parametrize("bands", [1, 3])
+def test_images_of_16_bits_look_like_those_of_8(bands: int) -> None:
+    dataset = products.images().isel(band=slice(0, bands))
+    deep = dataset.assign({name: dataset[name].astype(np.uint16) * 257 for name in ("left", "right")})
     figure = new_figure("any")
-    draw_images(figure, dataset)
-    assert figure.axes[0].images[0].get_clim() == (0, 65535)
+    draw_images(figure, deep)
+    np.testing.assert_array_equal(figure.axes[0].images[0].get_array(), np.broadcast_to(dataset["left"], (4, 6, 3)))
 
 
 def test_channels_in_use_give_their_names() -> None:
