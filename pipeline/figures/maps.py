@@ -18,6 +18,7 @@ from semidense.pipeline.figures.drawing import (
 )
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.images_and_truth import MASK_KINDS
+from semidense.pipeline.results.opening import recorded
 from semidense.stages.transforms.declaration import ORDER
 
 _VIEWS = ("left view (reference)", "right view")
@@ -66,7 +67,7 @@ def draw_channels(figure: Figure, dataset: xr.Dataset) -> None:
 def _channel_names(dataset: xr.Dataset) -> list[str]:
     """Return the names of the channels: those in use, as the product's settings tell."""
     count = dataset.sizes["channel"]
-    names = list(dataset.attrs.get("params", {}).get("use", ORDER))
+    names = list(recorded(dataset, "params").get("use", ORDER))
     return names if len(names) == count else [f"channel {index}" for index in range(count)]
 
 

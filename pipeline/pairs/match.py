@@ -153,8 +153,8 @@ class Match:
         from semidense.pipeline.figures.colours import view_rgb  # Matplotlib takes a second to load
 
         rows, columns = self.scene.size
-        centre = self.calibration.centre or ((columns - 1) / 2, (rows - 1) / 2)
         known, colours = self.calibration, view_rgb(self.image[np.isfinite(self.depth)])
+        centre = known.centre or ((columns - 1) / 2, (rows - 1) / 2)
         return geometry.points(self.depth, known.focal, centre, known.focal_y, known.skew), colours
 
     @property

@@ -1,7 +1,8 @@
 """Open a cached product as people want to look at it: with coordinates, units and names."""
 
+import json
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from semidense.cache import Store
 from semidense.pipeline.results.metric_rows import FIGURES
@@ -16,10 +17,15 @@ def open_product(store: Store, key: str) -> "xr.Dataset":
     Rows and columns get coordinates in px. Beside ``cost``, the log-odds of a mismatch, a cost volume
     offers its ``probability``. Each figure of ``metrics`` and ``ranking`` is an array of its own.
 
+    Its ``attrs`` say what made it, in types that every file format for arrays takes: ``key``, ``digest``, ``stage`` and
+    ``created`` are texts, ``seconds`` is a number, and ``label``, ``params``, ``inputs``, ``code``, ``environment``,
+    ``extras``, ``size`` and ``version`` are JSON texts, which ``recorded`` reads.
+
     Raises:
         CacheError: if the entry is missing or damaged.
     """
     dataset = store.open(key)
+    dataset.attrs = {name: _attribute(value) for name, value in dataset.attrs.items()}
     for dim in ("y", "x"):
         if dim in dataset.sizes:
             dataset = dataset.assign_coords({dim: (dim, range(dataset.sizes[dim]), {"units": "px"})})
@@ -28,6 +34,21 @@ def open_product(store: Store, key: str) -> "xr.Dataset":
         probability = 1 / (1 + math.e ** (-cost))
         dataset["probability"] = probability.assign_attrs(units="1", long_name="probability of a mismatch")
     return _with_named_figures(dataset) if "figures" in dataset else dataset
+
+
+def _attribute(value: object) -> str | float:
+    return value if isinstance(value, (str, float)) else json.dumps(value)
+
+
+def recorded(dataset: "xr.Dataset", part: str) -> dict[str, Any]:
+    """Return a part of what an opened product's attributes say, such as ``params``; empty if they do not say it.
+
+    >>> import xarray as xr
+    >>> recorded(xr.Dataset(attrs={"params": '{"R": 0.9}'}), "params")
+    {'R': 0.9}
+    """
+    found: dict[str, Any] = json.loads(dataset.attrs.get(part, "{}"))
+    return found
 
 
 def _with_named_figures(dataset: "xr.Dataset") -> "xr.Dataset":

@@ -80,7 +80,7 @@ def network() -> xr.Dataset:
 
 
 def shipped() -> xr.Dataset:
-    return network().assign_attrs(params={"shipped": "0123"})
+    return network().assign_attrs(params='{"shipped": "0123"}')
 
 
 def costvolume() -> xr.Dataset:

@@ -56,7 +56,7 @@ def test_images_of_16_bits_look_like_those_of_8(bands: int) -> None:
 
 
 def test_channels_in_use_give_their_names() -> None:
-    dataset = products.channels().isel(channel=[1]).assign_attrs(params={"use": ["rank"]})
+    dataset = products.channels().isel(channel=[1]).assign_attrs(params='{"use": ["rank"]}')
     figure = new_figure("any")
     draw_channels(figure, dataset)
     assert [axes.get_title() for axes in figure.axes] == ["rank, left view (reference)", "rank, right view"]
@@ -102,7 +102,7 @@ def test_a_short_curve_has_no_mean() -> None:
 
 def test_a_ranking_loss_is_told_and_has_no_coin_s_guess() -> None:
     figure = new_figure("any")
-    draw_network(figure, products.network().assign_attrs(params={"ranking": 4.0}))
+    draw_network(figure, products.network().assign_attrs(params='{"ranking": 4.0}'))
     assert "+ 4 x ranking loss" in figure.axes[0].get_ylabel()
     assert not any("coin" in str(line.get_label()) for line in figure.axes[0].lines)
 
