@@ -20,7 +20,7 @@ from semidense.pipeline.api import Task, run
 from semidense.pipeline.results.result import Result
 from semidense.stages.evaluation.agreement import agreement
 from semidense.stages.evaluation.declaration import ConfidenceParams
-from semidense.stages.metrics import auc, optimal_auc
+from semidense.stages.metrics.confidence import auc, optimal_auc
 
 WINDOWS = (9, 13, 17, 21, 25, 29, 33)
 WEIGHTS = (0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)

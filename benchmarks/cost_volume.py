@@ -33,7 +33,7 @@ from semidense.stages.matching.declaration import CostVolumeParams
 from semidense.stages.matching.descriptors.net import descriptor_net_from_parameters
 from semidense.stages.matching.descriptors.volume import fast_cost_volume
 from semidense.stages.matching.net import net_from_parameters
-from semidense.stages.metrics import raw_bad
+from semidense.stages.metrics.errors import raw_bad
 from semidense.stages.transforms.channels import channels
 from semidense.stages.transforms.gray import to_gray
 

@@ -24,7 +24,7 @@ from semidense.stages.compute.precision import resolve
 from semidense.stages.compute.threads import one_thread
 from semidense.stages.disparity.winner_takes_all import winner_take_all
 from semidense.stages.matching.declaration import COST_VOLUME, CostVolumeParams, Mode
-from semidense.stages.metrics import raw_bad
+from semidense.stages.metrics.errors import raw_bad
 from semidense.stages.transforms.channels import channels
 
 MODES: tuple[Mode, Mode] = ("guided", "exact")

@@ -20,7 +20,7 @@ from semidense.datasets import SceneSource, open_dataset
 from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
 from semidense.stages.disparity.winner_takes_all import winner_take_all
 from semidense.stages.matching.net import MatchingNet, net_from_parameters
-from semidense.stages.metrics import raw_bad
+from semidense.stages.metrics.errors import raw_bad
 
 FULL = 128
 RANKS = (16, 32, 64, 96)

@@ -23,7 +23,7 @@ from semidense.stages.disparity.winner_takes_all import winner_take_all
 from semidense.stages.matching.cost_volume import padded_cost_volume
 from semidense.stages.matching.declaration import RADIUS
 from semidense.stages.matching.net import MatchingNet, net_from_parameters
-from semidense.stages.metrics import raw_bad
+from semidense.stages.metrics.errors import raw_bad
 from semidense.stages.transforms.channels import channels
 
 

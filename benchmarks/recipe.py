@@ -30,7 +30,7 @@ from semidense.stages.compute.precision import resolve
 from semidense.stages.disparity.winner_takes_all import winner_take_all
 from semidense.stages.matching.cost_volume import compute_costs
 from semidense.stages.matching.declaration import CostVolumeParams
-from semidense.stages.metrics import raw_bad
+from semidense.stages.metrics.errors import raw_bad
 
 HELD = ("Laundry", "Bowling2", "Lampshade1", "Midd1", "Plastic", "Wood2")
 """Scenes of Middlebury 2005 and 2006, easy and hard."""

@@ -1,4 +1,8 @@
-"""Tell which pixels of the left view are visible in the right view, from the ground truth alone."""
+"""Tell which pixels of the left view are visible in the right view, from the ground truth alone.
+
+``stages/disparity/right_view.py`` checks computed maps in the same way: neither package may import the other, and one
+table of tests holds both.
+"""
 
 import numpy as np
 import numpy.typing as npt

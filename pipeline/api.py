@@ -21,11 +21,10 @@ from semidense.pipeline.plan.presets import DEFAULT
 from semidense.pipeline.plan.ranges import close_ranges
 from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.plan.training_split import training_scenes
+from semidense.pipeline.results.metric_rows import METHOD
 from semidense.pipeline.results.result import Result
 
 CACHE_VARIABLE = "PIPELINE_CACHE"
-METHOD = "dual-cnn"
-"""What this pipeline is called in the rows of metrics."""
 
 
 def open_store(folder: Path | str | None = None) -> Store:
@@ -187,7 +186,7 @@ def carry_out(
 
 def _metric_rows(plan: Plan, store: Store, made: Mapping[str, Made]) -> Iterator[dict[str, Any]]:
     """Yield the rows of every metrics product that was asked for."""
-    from semidense.stages.metrics import metric_rows
+    from semidense.stages.metrics.stage import metric_rows
 
     for step_id, variant in plan.targets:
         each = made[step_id]

@@ -23,7 +23,8 @@ from semidense.stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, 
 from semidense.stages.evaluation.filtering import SEMIDENSE
 from semidense.stages.evaluation.silence.declaration import COST_MARGIN, DISTINCTIVENESS
 from semidense.stages.matching.declaration import COST_VOLUME, DESCRIPTOR_NET, MATCHING_NET, MATCHING_SAMPLES
-from semidense.stages.metrics import METRICS
+from semidense.stages.metrics.ranking import RANKING
+from semidense.stages.metrics.stage import METRICS
 from semidense.stages.stage import Stage, StageError
 from semidense.stages.transforms.declaration import CHANNELS
 
@@ -48,6 +49,7 @@ CATALOG: tuple[Stage, ...] = (
     SEMIDENSE,
     REFINED,
     FILLED,
+    RANKING,
     METRICS,
 )
 """The stages, in the order of the dataflow."""

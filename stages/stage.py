@@ -170,3 +170,13 @@ def require_shape(name: str, array: Array, ndim: int) -> None:
     """
     if np.ndim(array) != ndim:
         raise StageError(f"{name} has shape {np.shape(array)}, expected {ndim} dimensions")
+
+
+def require_share(name: str, value: float) -> None:
+    """Refuse a number outside [0, 1].
+
+    Raises:
+        StageError: naming it and its value; NaN is outside.
+    """
+    if not 0 <= value <= 1:
+        raise StageError(f"{name} is {value:g}, expected a number in [0, 1]")

@@ -134,13 +134,22 @@ class Change:
 
     def __str__(self) -> str:
         """Return one line for people, long hashes cut short."""
-        return f"{self.field}: {_short(self.old)} -> {_short(self.new)}"
+        return f"{self.field}: {short(self.old)} -> {short(self.new)}"
 
 
-def _short(value: object) -> str:
-    """Return a value's text; of a hash the first 12 digits tell enough."""
+def is_hash(value: object) -> bool:
+    """Return whether a value is a sha256 in lower-case hexadecimal: a key, a digest or the hash of a file."""
+    return isinstance(value, str) and len(value) == 64 and set(value) <= set("0123456789abcdef")
+
+
+def short(value: object) -> str:
+    """Return a value's text; of a hash the first 12 digits, which tell it from all others of a cache.
+
+    >>> short("ab" * 32), short(31), short("rank")
+    ('abababababab', '31', 'rank')
+    """
     text = value if isinstance(value, str) else canonical(value)
-    return text[:12] if len(text) == 64 and set(text) <= set("0123456789abcdef") else text
+    return text[:12] if is_hash(text) else text
 
 
 def differences(old: Recipe, new: Recipe) -> list[Change]:

@@ -76,7 +76,7 @@ def compare(
     from semidense.pipeline.comparison import tables
     from semidense.pipeline.execution.progress import ProgressWatch
     from semidense.pipeline.plan.errors import UsageError
-    from semidense.stages.metrics import THRESHOLDS
+    from semidense.stages.metrics.errors import THRESHOLDS
 
     if threshold not in THRESHOLDS:
         offered = ", ".join(f"{each:g}" for each in THRESHOLDS)

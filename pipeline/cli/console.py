@@ -9,12 +9,15 @@ from rich.markup import escape
 from rich.table import Table
 
 from semidense.cache import Change
+from semidense.cache.keys.recipe import short
 from semidense.pipeline.execution.scheduler import totals
 from semidense.pipeline.plan.causes import PENDING
 from semidense.pipeline.plan.plan import Made, Plan, Planned
-from semidense.pipeline.results.metric_rows import FIGURES, HEADINGS, SWEEP_THRESHOLD, mean_rows
+from semidense.pipeline.results.metric_rows import FIGURES, SWEEP_THRESHOLD, averaged, with_means
 from semidense.pipeline.results.text import results
+from semidense.stages.metrics.stage import ROW
 
+_COLUMNS = (*ROW, "pixels")
 STYLES = {"hit": "green", "made": "cyan", "stale": "yellow", "missing": "dim"}
 
 
@@ -53,7 +56,7 @@ def print_plan(plan: Plan) -> None:
     for planned in plan.steps:
         state = f"[{STYLES[planned.state]}]{planned.state}[/]"
         scene, reason = escape(planned.step.scene), escape(why(planned))
-        table.add_row(planned.step.product, scene, state, (planned.key or "")[:12], reason)
+        table.add_row(planned.step.product, scene, state, short(planned.key or ""), reason)
     console = results()
     console.print(table)
     print_notes(plan.notes)
@@ -109,16 +112,19 @@ def print_metrics(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -
         rows: as ``run --json`` gives them.
         masks: where the mask of each scene comes from.
     """
-    rows = [row for row in rows if row["mask"] == "nonocc"]
-    if not rows:
-        return
+    shown = with_means([row for row in rows if row["mask"] == "nonocc"])
+    if shown:
+        _print_rows(shown, masks)
+
+
+def _print_rows(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -> None:
     swept = len({_swept(row) for row in rows}) > 1
-    table = Table("scene", "threshold px", "R", *(HEADINGS[name] for name in FIGURES), "pixels", box=None)
+    table = Table("scene", "threshold px", "R", *(FIGURES[name].head for name in _COLUMNS), box=None)
     for column in table.columns[1:]:
         column.justify = "right"
     if swept:
         table.add_column("settings")
-    for row in [*rows, *mean_rows(rows)]:
+    for row in rows:
         table.add_row(*_cells(row), *([escape(_swept(row))] if swept else []))
     console = results()
     console.print(table)
@@ -138,13 +144,13 @@ def _swept(row: Mapping[str, Any]) -> str:
 
 
 def _cells(row: Mapping[str, Any]) -> list[str]:
-    digits = {"auc": 4, "auc_optimal": 4, "avgerr": 2, "rms": 2}
-    figures = [f"{row[name]:.{digits.get(name, 1)}f}" if name in row else "-" for name in FIGURES]
+    figures = [FIGURES[name].text(row.get(name)) for name in _COLUMNS]
     threshold = f"{row['R']:g}" if "R" in row else "-"
-    return [escape(row["scene"]), f"{row['threshold_px']:g}", threshold, *figures, str(row["pixels"])]
+    return [escape(row["scene"]), f"{row['threshold_px']:g}", threshold, *figures]
 
 
 def print_sweep(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -> None:
     """Print error and density for each R: the mean over scenes, or the scene if there is one."""
     chosen = [row for row in rows if row["mask"] == "nonocc" and row["threshold_px"] == SWEEP_THRESHOLD]
-    print_metrics(mean_rows(chosen) or chosen, masks)
+    if chosen:
+        _print_rows(averaged(chosen), masks)

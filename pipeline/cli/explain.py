@@ -1,6 +1,5 @@
 """Say what a product's key is made of, readable by people and by scripts."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from semidense.pipeline.cli.console import why
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Planned
 from semidense.pipeline.results.provenance import ancestry, tree_lines
+from semidense.pipeline.results.text import value_text
 
 
 def explanation(planned: Planned, store: Store) -> dict[str, Any]:
@@ -84,19 +84,10 @@ def print_explanation(found: Mapping[str, Any], graph: Path | None = None) -> No
     for part in ("params", "inputs", "environment", "code"):
         console.print(f"\n{part}", style="bold")
         for name, value in found["recipe"][part].items():
-            console.print(f"  {name} = {_short(value)}", markup=False)
+            console.print(f"  {name} = {value_text(value)}", markup=False)
     if "tree" in found:
         console.print("\nmade from", style="bold")
         for line in found["tree"][1:]:
             console.print(line, markup=False)
     if graph:
         console.print(f"wrote {graph}", markup=False)
-
-
-def _short(value: object) -> str:
-    """Return a value as JSON; of a hash the first 12 digits, of many the first and how many there are."""
-    if isinstance(value, list) and len(value) > 3 and all(isinstance(item, str) for item in value):
-        return f"{_short(value[0])} and {len(value) - 1} more"
-    if isinstance(value, str) and len(value) == 64:
-        return value[:12]
-    return value if isinstance(value, str) else json.dumps(value)

@@ -12,6 +12,7 @@ from semidense.pipeline.cli.console import print_json, why
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Planned
 from semidense.pipeline.results.opening import open_product
+from semidense.pipeline.results.text import opening_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -124,8 +125,4 @@ def print_inspection(found: Inspection, png: Path | None, as_json: bool) -> None
     _draw_in_terminal(found)
     if png:
         console.print(f"wrote {png}", markup=False)
-    console.print(
-        "in Python: from semidense.pipeline import open_product, open_store; "
-        f'open_product(open_store("{found.store.root}"), "{found.planned.key}")',
-        markup=False,
-    )
+    console.print(f"in Python: {opening_text(found.store.root, str(found.planned.key))}", markup=False)

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.segment import Segment, Segments
 from rich.style import Style
 
-from semidense.pipeline.figures.colours import confidence_rgb, disparity_rgb, disparity_span
+from semidense.pipeline.figures.colours import confidence_rgb, disparity_rgb, disparity_span, view_rgb
 from semidense.pipeline.pages.scene_maps import step_for
 
 COLUMNS, ROWS = 72, 24
@@ -88,9 +88,7 @@ def small_picture(product: str, dataset: xr.Dataset) -> Small | None:
     step = step_for(dataset.sizes["y"], dataset.sizes["x"], _PIXELS)
     thin = dataset.isel(y=slice(None, None, step), x=slice(None, None, step))
     if product == "images":
-        view = thin["left"].values
-        eight = (view >> 8).astype(np.uint8) if view.dtype == np.uint16 else view
-        return Small(np.broadcast_to(eight, (*eight.shape[:2], 3)), "left view")
+        return Small(view_rgb(thin["left"].values), "left view")
     if maps[0] == "confidence":
         return Small(confidence_rgb(thin["confidence"].values), "confidence: blue 0, yellow 1, black none")
     return small_disparity(thin["disparity"].values)

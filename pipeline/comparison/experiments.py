@@ -17,14 +17,12 @@ from semidense.pipeline.comparison.ablation import ABLATION, ablation_request, a
 from semidense.pipeline.comparison.paper_figures import NAMED
 from semidense.pipeline.comparison.protocols import PROTOCOLS, protocol_requests, require_protocols
 from semidense.pipeline.comparison.rows import (
-    OURS,
     Judged,
     Row,
     auc_rows,
     curve_rows,
     density_rows,
     equal_density,
-    mean_rows,
     raw_rows,
 )
 from semidense.pipeline.execution.watch import Watch
@@ -33,6 +31,7 @@ from semidense.pipeline.plan.environment import missing_packages
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.training_split import training_scenes
+from semidense.pipeline.results.metric_rows import METHOD, mean_rows
 from semidense.pipeline.results.result import Result
 from semidense.stages.catalog import STAGES
 from semidense.stages.stage import Arrays
@@ -61,7 +60,7 @@ MEASURES = {
     "cost": ("cost_confidence", "msm"),
 }
 """Confidence measures of the raw map, by name: product and array."""
-LEARNT = ("o1", "ccnn")
+_TAUGHT = ("o1", "ccnn")
 """Products that need training scenes; ``--train-on`` names them."""
 _ALWAYS = ("images", "truth", "disparity", "confidence")
 _SHIPPED = ", shipped weights"
@@ -74,7 +73,7 @@ class Comparison:
     """What a comparison found.
 
     Attributes:
-        rows: a row an experiment, scene, method, mask, threshold and, on a curve, R; see ``comparison_rows.FIGURES``.
+        rows: a row an experiment, scene, method, mask, threshold and, on a curve, R; see ``metric_rows.FIGURES``.
         unavailable: ``method`` and ``why`` of what was not run.
         notes: what a person should know.
         result: of the run behind it, with every product.
@@ -209,7 +208,7 @@ def _reason(product: str, trained: bool, without: Sequence[str]) -> str:
     packages = [name for stage in (STAGES[product], *inputs) for name in missing_packages(stage)]
     if packages:
         return f"needs {' and '.join(packages)}: pip install 'semidense-stereo[baselines]'"
-    return _UNTRAINED if product in LEARNT and not trained else ""
+    return _UNTRAINED if product in _TAUGHT and not trained else ""
 
 
 def _no_ablation(trained: bool, without: Sequence[str]) -> str:
@@ -246,7 +245,7 @@ def _named(rows: Iterable[Row], protocol: str) -> Iterator[Row]:
 
 
 def _raw(judged: Judged, products: Mapping[str, Arrays], _: float | None) -> Iterator[Row]:
-    yield from raw_rows(judged, f"{OURS}{_SHIPPED}", products["disparity"]["disparity"])
+    yield from raw_rows(judged, f"{METHOD}{_SHIPPED}", products["disparity"]["disparity"])
     for method, product in MATCHERS.items():
         if product in products:
             yield from raw_rows(judged, method, products[product]["dense"])
@@ -255,7 +254,7 @@ def _raw(judged: Judged, products: Mapping[str, Arrays], _: float | None) -> Ite
 
 
 def _density(judged: Judged, products: Mapping[str, Arrays], R: float | None) -> Iterator[Row]:
-    yield from (row | {"R": R} for row in density_rows(judged, OURS, products["semidense"]["disparity"]))
+    yield from (row | {"R": R} for row in density_rows(judged, METHOD, products["semidense"]["disparity"]))
     yield from matcher_rows(judged, products)
     yield from curve_rows(judged, _ours(products))
 

@@ -10,11 +10,12 @@ from typing import Any
 from semidense.datasets.formats.atomic import atomic_write
 from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.figures import density_figure, dots_figure, sheets
-from semidense.pipeline.comparison.rows import FIGURES, Row
+from semidense.pipeline.comparison.rows import Row
 from semidense.pipeline.comparison.tables import THRESHOLD, TITLES, at, of, quoted
 from semidense.pipeline.files.writing import explaining, save_png, writable_folder
+from semidense.pipeline.results.metric_rows import FIGURES
 
-COLUMNS = ("experiment", "scene", "method", "mask", "threshold_px", "R", "pixels", *FIGURES, "quoted", "data")
+COLUMNS = ("experiment", "scene", "method", "mask", "threshold_px", "R", *FIGURES, "quoted", "data")
 """The columns of ``comparison.csv``."""
 
 

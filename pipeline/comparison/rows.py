@@ -7,27 +7,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.metrics import MASKS, THRESHOLDS, Errors, Ranking, error_at_density, error_curve, optimal_auc
-from semidense.stages.metrics.errors import counted
+from semidense.pipeline.results.metric_rows import METHOD
+from semidense.stages.metrics.confidence import error_at_density
+from semidense.stages.metrics.errors import MASKS, THRESHOLDS, Errors, counted
+from semidense.stages.metrics.ranking import ranked
+from semidense.stages.metrics.tally import Block, Tally
 from semidense.stages.stage import Arrays
 
 Row = dict[str, Any]
 Mask = NDArray[np.bool_]
 CURVE_R = (*(round(0.05 * step, 2) for step in range(20)), 0.99)
 """The thresholds of the curve of error against invalid pixels."""
-OURS = "dual-cnn"
-FIGURES = {
-    "raw_bad": "wrong or unreported pixels of the dense map, %",
-    "bad": "wrong pixels among the reported, %",
-    "invalid": "pixels that are not reported, %",
-    "bad_dual_cnn": "wrong pixels of dual-cnn at the same density, %",
-    "avgerr": "mean absolute error of the reported pixels, px",
-    "rms": "root mean squared error of the reported pixels, px",
-    **{name: f"error that {name[1:]} % of the reported pixels keep to, px" for name in ("A50", "A90", "A95", "A99")},
-    "auc": "area under the error curve of a confidence",
-    "auc_optimal": "the area that a perfect confidence reaches",
-}
-"""Every figure of a row and its meaning."""
 
 
 @dataclass(frozen=True)
@@ -89,55 +79,37 @@ def density_rows(judged: Judged, method: str, reported: NDArray[np.float32]) -> 
 def equal_density(rows: Iterator[Row], judged: Judged, ours: Mapping[str, NDArray[np.float32]]) -> Iterator[Row]:
     """Yield rows with the error of our map at the density of each; ``ours`` has ``disparity`` and ``confidence``."""
     for row in rows:
-        chosen = counted(judged.disparity, judged.pixels(row["mask"]))
-        correct = np.abs(ours["disparity"] - judged.disparity)[chosen] <= row["threshold_px"]
         density = 1 - row["invalid"] / 100 if "invalid" in row else 0
-        figure = error_at_density(ours["confidence"][chosen], correct, density) if density > 0 else float("nan")
-        yield row | _known({"bad_dual_cnn": figure})
+        yield row | (_known({"bad_dual_cnn": _error_at(density, row, judged, ours)}) if density > 0 else {})
+
+
+def _error_at(density: float, row: Row, judged: Judged, ours: Mapping[str, NDArray[np.float32]]) -> float:
+    """Return the error of our map at a density, with the mask and the threshold of a row."""
+    pixels = judged.pixels(row["mask"])
+    correct = Errors.of(ours["disparity"], judged.disparity, pixels).absolute <= row["threshold_px"]
+    return error_at_density(ours["confidence"][counted(judged.disparity, pixels)], correct, density)
 
 
 def curve_rows(judged: Judged, ours: Mapping[str, NDArray[np.float32]]) -> Iterator[Row]:
     """Yield error and invalid pixels of our map for every R of ``CURVE_R``."""
-    for row, mask, threshold in judged.rows("curve", OURS):
-        curve = error_curve(ours["confidence"], ours["disparity"], judged.disparity, mask, threshold, CURVE_R)
-        for R, bad, invalid in zip(*(values.tolist() for values in curve), strict=True):
-            yield row | {"R": R} | _known({"bad": bad, "invalid": invalid})
+    maps = Block(ours["disparity"], ours["confidence"], judged.disparity, judged.truth["nonocc"])
+    tally = Tally.of([maps], CURVE_R)
+    for row, _, threshold in judged.rows("curve", METHOD):
+        for point in tally.rows(judged.scene, row["mask"], threshold):
+            yield row | {name: point[name] for name in ("R", "bad", "invalid") if name in point}
 
 
 def auc_rows(
     judged: Judged, method: str, confidence: NDArray[np.float32], disparity: NDArray[np.float32]
 ) -> Iterator[Row]:
     """Yield the area under the error curve of a confidence of a raw map, and the area of a perfect one."""
-    rankings: dict[str, Ranking] = {}  # sorting is what takes time, and all thresholds share it
+    by_mask: dict[str, dict[float, dict[str, float]]] = {}  # sorting is what takes time: all thresholds share it
     for row, mask, threshold in judged.rows("auc", method):
-        chosen = counted(judged.disparity, mask)
-        if row["mask"] not in rankings:
-            rankings[row["mask"]] = Ranking.of(confidence[chosen])
-        correct = np.abs(disparity - judged.disparity)[chosen] <= threshold
-        error_rate = float(np.mean(~correct)) if correct.size else float("nan")
-        auc = rankings[row["mask"]].auc(correct)
-        yield row | _known({"raw_bad": 100 * error_rate, "auc": auc, "auc_optimal": optimal_auc(error_rate)})
+        if row["mask"] not in by_mask:
+            by_mask[row["mask"]] = ranked(disparity, confidence, judged.disparity, mask)
+        yield row | _known(by_mask[row["mask"]][threshold])
 
 
 def _known(figures: Mapping[str, float]) -> dict[str, float]:
     """Return the figures that apply: a key whose figure is NaN is absent."""
-    return {name: float(value) for name, value in figures.items() if not np.isnan(value)}
-
-
-def mean_rows(rows: list[Row]) -> list[Row]:
-    """Return the mean over scenes of each figure, for rows that differ in nothing but the scene.
-
-    A figure that a scene lacks has no mean: means over different scenes could not be compared.
-    """
-    groups: dict[tuple[Any, ...], list[Row]] = {}
-    for row in rows:
-        key = tuple(row.get(name) for name in ("experiment", "method", "mask", "threshold_px", "R"))
-        groups.setdefault(key, []).append(row)
-    return [_mean(group) for group in groups.values()]
-
-
-def _mean(rows: list[Row]) -> Row:
-    shared = [name for name in FIGURES if all(name in row for row in rows)]
-    same = {name: value for name, value in rows[0].items() if name not in FIGURES}
-    means = {name: float(np.mean([row[name] for row in rows])) for name in shared}
-    return same | {"scene": f"mean of {len(rows)}", "pixels": sum(row["pixels"] for row in rows)} | means
+    return {name: value for name, value in figures.items() if not np.isnan(value)}

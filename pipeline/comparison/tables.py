@@ -9,7 +9,8 @@ from rich.table import Table
 
 from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.paper_figures import QUOTED
-from semidense.pipeline.comparison.rows import FIGURES, Row
+from semidense.pipeline.comparison.rows import Row
+from semidense.pipeline.results.metric_rows import FIGURES, mean_name
 from semidense.pipeline.results.text import results
 
 MASK, THRESHOLD = "nonocc", 1.0
@@ -19,7 +20,6 @@ TITLES = {
     "auc": "Confidence of the raw map: area under the error curve; lower is better",
 }
 _DENSITY = ("invalid", "bad", "bad_dual_cnn", "avgerr", "rms", "A50", "A90", "A95", "A99")
-_SHORT = {"invalid": "invalid %", "bad": "bad %", "bad_dual_cnn": "bad % of dual-cnn, same density", "auc": "AUC"}
 
 
 def quoted(found: Comparison) -> list[Row]:
@@ -89,9 +89,9 @@ def _by_scene(rows: Sequence[Row], means: Sequence[Row], experiment: str, figure
 
 def _density_table(means: Sequence[Row]) -> Table:
     """Return a table of what semi-dense maps report: means over the scenes."""
-    plural = "" if means[0]["scene"] == "mean of 1" else "s"
-    title = f"Semi-dense maps, {means[0]['scene']} scene{plural}; errors of reported pixels, px"
-    table = _table(title, "method", "R", *(_SHORT.get(name, name) for name in _DENSITY))
+    plural = "" if means[0]["scene"] == mean_name(1) else "s"
+    title = f"Semi-dense maps, {means[0]['scene']} scene{plural}"
+    table = _table(title, "method", "R", *(FIGURES[name].head for name in _DENSITY))
     for row in means:
         threshold = f"{row['R']:g}" if "R" in row else "-"
         table.add_row(escape(row["method"]), threshold, *(_cell(row, name) for name in _DENSITY))
@@ -116,7 +116,7 @@ def _print_quoted(console: Console, quoted: Sequence[Row]) -> None:
         groups.setdefault((figure, row["data"]), []).append(row)
     for (figure, data), rows in groups.items():
         values = ", ".join(f"{row['method']} {_cell(row, figure)}" for row in rows)
-        console.print(f"{_SHORT.get(figure, figure)}, {data}:", style="dim", markup=False)
+        console.print(f"{FIGURES[figure].head}, {data}:", style="dim", markup=False)
         console.print(f"  {values}", markup=False)
 
 
@@ -128,5 +128,4 @@ def _table(title: str, *columns: str) -> Table:
 
 
 def _cell(row: Row, figure: str) -> str:
-    digits = 4 if figure.startswith("auc") else 2
-    return f"{row[figure]:.{digits}f}" if figure in row else "-"
+    return FIGURES[figure].text(row.get(figure))

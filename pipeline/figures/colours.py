@@ -14,7 +14,7 @@ from matplotlib.colors import Colormap, ListedColormap
 from numpy.typing import NDArray
 
 from semidense.pipeline.plan.errors import UsageError
-from semidense.stages.metrics import THRESHOLDS
+from semidense.stages.metrics.errors import THRESHOLDS
 
 NONE = "#000000"
 """A pixel without a value."""
@@ -28,6 +28,22 @@ LINES = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY)
 QUIET = "#B0B0B0"
 """What stands back behind the rest."""
 _CLIPPED = 0.5
+
+
+def view_rgb(view: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return a view of the pair as 8-bit colours, to look at.
+
+    Args:
+        view: (..., band) uint8 or uint16, one band or three; 16 bits are divided by 257, to the nearest whole number.
+
+    Returns:
+        (..., 3) uint8 RGB.
+
+    >>> view_rgb(np.array([[[0], [128], [129], [65535]]], np.uint16))[0, :, 0].tolist()
+    [0, 0, 1, 255]
+    """
+    eight = ((view.astype(np.uint32) + 128) // 257).astype(np.uint8) if view.dtype == np.uint16 else view
+    return np.broadcast_to(eight, (*eight.shape[:-1], 3))
 
 
 @cache

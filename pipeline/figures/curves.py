@@ -1,6 +1,6 @@
 """The error-versus-invalid curve: what a threshold on the confidence buys, and what it costs."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import cycle
 from typing import Any
 
@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from semidense.pipeline.figures.colours import LINES
 from semidense.pipeline.figures.drawing import new_figure
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.results.metric_rows import Row, mean_name, mean_rows
 
-Row = Mapping[str, Any]
 Curve = dict[float, tuple[float, float]]
 """R -> (invalid, bad), both in percent."""
 _MARKED = 5
@@ -46,30 +46,36 @@ def error_curve_figure(
     Raises:
         UsageError: if no row is left.
     """
-    curves = _curves(row for row in rows if row["mask"] == mask and row["threshold_px"] == threshold)
-    if not curves:
+    chosen = [row for row in rows if row["mask"] == mask and row["threshold_px"] == threshold and "R" in row]
+    curves = _by(chosen, lambda row: _named(str(row["scene"]), row))
+    drawn = {name: points for name, of in curves.items() if (points := _points(of))}
+    if not drawn:
         raise UsageError(f"no row has an R, the mask {mask} and the threshold {threshold:g} px: nothing to draw")
     figure = new_figure(title)
     figure.set_size_inches(9.5, 6)
     axes = figure.subplots()
     styles = cycle([(colour, dash) for dash in _DASHES for colour in LINES])
-    for (scene, family), curve in curves.items():
+    for name, curve in drawn.items():
         colour, dash = next(styles)
-        _draw(axes, curve, _named(scene, family), color=colour, linestyle=dash, linewidth=1.2, marker=".")
-    _draw_means(axes, curves)
+        _draw(axes, curve, name, color=colour, linestyle=dash, linewidth=1.2, marker=".")
+    _draw_means(axes, chosen)
     draw_matchers(axes, others)
     _label(axes, mask, threshold)
     return figure
 
 
-def _curves(rows: Iterable[Row]) -> dict[tuple[str, str], Curve]:
-    """Return the points of each scene, by scene and family."""
-    curves: dict[tuple[str, str], Curve] = {}
+def _by(rows: Iterable[Row], name: Callable[[Row], str]) -> dict[str, list[Row]]:
+    """Return the rows in groups, by name."""
+    groups: dict[str, list[Row]] = {}
     for row in rows:
-        if row.get("R") is not None and row.get("bad") is not None:
-            key = (str(row["scene"]), _family(row))
-            curves.setdefault(key, {})[float(row["R"])] = (float(row["invalid"]), float(row["bad"]))
-    return {key: dict(sorted(curve.items())) for key, curve in curves.items()}
+        groups.setdefault(name(row), []).append(row)
+    return groups
+
+
+def _points(rows: Iterable[Row]) -> Curve:
+    """Return the points of a curve in the order of R; where nothing is reported there is none."""
+    known = {float(row["R"]): row for row in rows if "bad" in row}
+    return {R: (float(row["invalid"]), float(row["bad"])) for R, row in sorted(known.items())}
 
 
 def _family(row: Row) -> str:
@@ -78,30 +84,19 @@ def _family(row: Row) -> str:
     return ", ".join(setting for setting in settings if not setting.startswith("semidense.R="))
 
 
-def _named(scene: str, family: str) -> str:
-    return f"{scene}, {family}" if family else scene
+def _named(what: str, row: Row) -> str:
+    return f"{what}, {family}" if (family := _family(row)) else what
 
 
-def mean_curve(curves: Sequence[Curve]) -> Curve:
-    """Return the mean of several curves at each R that all of them have.
-
-    >>> mean_curve([{0.1: (0.0, 8.0), 0.9: (40.0, 1.0)}, {0.1: (10.0, 4.0)}])
-    {0.1: (5.0, 6.0)}
-    """
-    shared = [R for R in curves[0] if all(R in curve for curve in curves)]
-    means = {R: np.mean([curve[R] for curve in curves], axis=0) for R in shared}
-    return {R: (float(invalid), float(bad)) for R, (invalid, bad) in means.items()}
-
-
-def _draw_means(axes: Axes, curves: Mapping[tuple[str, str], Curve]) -> None:
+def _draw_means(axes: Axes, rows: Iterable[Row]) -> None:
     """Draw the mean of each family of several scenes, and write R beside it, or beside a family's only curve."""
-    families = dict.fromkeys(family for _, family in curves)
-    for dash, family in zip(cycle(_DASHES), families, strict=False):
-        members = [curve for (_, of), curve in curves.items() if of == family]
-        mean = mean_curve(members)
-        if len(members) > 1 and mean:
-            name = _named(f"mean of {len(members)} scenes", family)
-            _draw(axes, mean, name, color="black", linestyle=dash, linewidth=2.6, marker="o", markersize=4)
+    for dash, family in zip(cycle(_DASHES), _by(rows, _family).values(), strict=False):
+        scenes = len({row["scene"] for row in family})
+        over = mean_name(scenes)
+        mean = _points(row for row in mean_rows(family) if row["scene"] == over)
+        if scenes > 1 and mean:
+            style = {"color": "black", "linestyle": dash, "linewidth": 2.6, "marker": "o", "markersize": 4}
+            _draw(axes, mean, _named(f"{over} scenes", family[0]), **style)
         _write_thresholds(axes, mean)
 
 

@@ -26,6 +26,7 @@ from semidense.pipeline.figures.metrics_table import draw_metrics
 from semidense.pipeline.figures.survey import draw_survey
 from semidense.pipeline.figures.training import draw_evaluation_samples, draw_matching_samples, draw_network
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.results.opening import recorded
 
 __all__ = [
     "confidence_rgb",
@@ -55,6 +56,7 @@ _DRAW: Mapping[str, Callable[..., None]] = {
     "right_disparity": draw_disparity,
     "refined": draw_disparity,
     "filled": draw_disparity,
+    "ranking": draw_metrics,
     "metrics": draw_metrics,
     **dict.fromkeys(("sgm", "census", "sncc", "mc_cnn", "mc_cnn_accurate"), draw_disparity),
     **dict.fromkeys(("o1", "ccnn"), draw_confidence),
@@ -113,13 +115,13 @@ def figure(
 def product_title(dataset: xr.Dataset) -> str:
     """Return scene, product and the settings that matter of a cached product, from the provenance in its ``attrs``.
 
-    >>> about = {"label": {"scene": "Teddy", "product": "semidense"}, "params": {"R": 0.9, "tiles": "128 rows"}}
+    >>> about = {"label": '{"scene": "Teddy", "product": "semidense"}', "params": '{"R": 0.9, "tiles": "128 rows"}'}
     >>> product_title(xr.Dataset(attrs=about))
     'Teddy: semidense (R 0.9)'
     """
-    label: Mapping[str, str] = dataset.attrs.get("label", {})
+    label = recorded(dataset, "label")
     product = label.get("product", "product")
-    settings = _told(product, dataset.attrs.get("params", {}))
+    settings = _told(product, recorded(dataset, "params"))
     return f"{label.get('scene', 'no scene')}: {product}" + (f" ({settings})" if settings else "")
 
 

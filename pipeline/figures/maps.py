@@ -1,15 +1,11 @@
 """Figures of what has the image's rows and columns: images, truth, channels, disparities, confidence."""
 
-from typing import Any
-
 import matplotlib
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from semidense.pipeline.figures.colours import NONE, ORANGE, SKY, confidence_colours
+from semidense.pipeline.figures.colours import NONE, ORANGE, SKY, confidence_colours, view_rgb
 from semidense.pipeline.figures.drawing import (
     Scale,
     disparity_scale,
@@ -22,6 +18,7 @@ from semidense.pipeline.figures.drawing import (
 )
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.images_and_truth import MASK_KINDS
+from semidense.pipeline.results.opening import recorded
 from semidense.stages.transforms.declaration import ORDER
 
 _VIEWS = ("left view (reference)", "right view")
@@ -32,16 +29,8 @@ def draw_images(figure: Figure, dataset: xr.Dataset) -> None:
     views = dataset["left"].values, dataset["right"].values
     axes = image_panels(figure, views[0].shape[:2], columns=2)[0]
     for each, view, name, (mean, std) in zip(axes, views, _VIEWS, dataset["moments"].values, strict=True):
-        _draw_view(each, view)
+        each.imshow(view_rgb(view))
         each.set_title(f"{name}: gray {mean:.0f} ± {std:.0f} of 255")
-
-
-def _draw_view(axes: Axes, view: NDArray[Any]) -> None:
-    """Draw a view (y, x, band): colours as they are, gray from black to the largest level of its depth."""
-    if view.shape[2] == 1:
-        axes.imshow(view[..., 0], cmap="gray", vmin=0, vmax=np.iinfo(view.dtype).max)
-    else:
-        axes.imshow(view)
 
 
 def draw_truth(figure: Figure, dataset: xr.Dataset) -> None:
@@ -78,7 +67,7 @@ def draw_channels(figure: Figure, dataset: xr.Dataset) -> None:
 def _channel_names(dataset: xr.Dataset) -> list[str]:
     """Return the names of the channels: those in use, as the product's settings tell."""
     count = dataset.sizes["channel"]
-    names = list(dataset.attrs.get("params", {}).get("use", ORDER))
+    names = list(recorded(dataset, "params").get("use", ORDER))
     return names if len(names) == count else [f"channel {index}" for index in range(count)]
 
 

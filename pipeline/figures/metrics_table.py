@@ -1,28 +1,25 @@
 """The figures of a scene as a table to look at."""
 
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.table import Table
 from matplotlib.transforms import Bbox
 
-from semidense.stages.metrics import MASKS
-from semidense.stages.metrics.stage import FIGURES
+from semidense.pipeline.results.metric_rows import FIGURES
+from semidense.stages.metrics.errors import MASKS
 
-_DIGITS = {"%": 2, "px": 3, "1": 4}
-"""Digits after the point, by unit."""
 _NOTE = (
-    "raw_bad: wrong or missing pixels before filtering; bad: wrong ones among the reported; invalid: not reported.\n"
+    "raw bad: wrong or missing pixels before filtering; bad: wrong ones among the reported; invalid: not reported.\n"
     "nonocc: pixels that both views see; all: also those hidden in the right view; both only where the truth is known."
 )
 
 
 def draw_metrics(figure: Figure, dataset: xr.Dataset) -> None:
-    """Draw the product ``metrics`` as a table: a row a mask and threshold, a column a figure with its unit."""
+    """Draw the product ``metrics`` or ``ranking``: a row a mask and threshold, a column a figure with its unit."""
     names = [name for name in FIGURES if name in dataset]
-    head = ["mask", "threshold\n(px)", *(_head(name) for name in names)]
+    head = ["mask", "threshold\n(px)", *(FIGURES[name].head.replace(" ", "\n") for name in names)]
     rows = [
-        [mask, f"{threshold:g}", *(_cell(name, float(dataset[name].values[m, t])) for name in names)]
+        [mask, f"{threshold:g}", *(FIGURES[name].text(float(dataset[name].values[m, t])) for name in names)]
         for m, mask in enumerate(MASKS)
         for t, threshold in enumerate(dataset["threshold"].values)
     ]
@@ -32,19 +29,6 @@ def draw_metrics(figure: Figure, dataset: xr.Dataset) -> None:
     table = axes.table(rows, colLabels=head, cellLoc="right", bbox=Bbox.unit())
     _style(table)
     figure.supxlabel(_NOTE, fontsize="small", color="#404040")
-
-
-def _head(name: str) -> str:
-    unit = FIGURES[name][1]
-    return f"{name}\n({unit})" if unit != "1" else name.replace("_", "\n")
-
-
-def _cell(name: str, value: float) -> str:
-    """Return a figure as text; ``n/a`` where it does not apply."""
-    dtype, unit, _ = FIGURES[name]
-    if np.isnan(value):
-        return "n/a"
-    return f"{value:,.0f}" if dtype == "int64" else f"{value:.{_DIGITS[unit]}f}"
 
 
 def _style(table: Table) -> None:

@@ -12,6 +12,7 @@ from matplotlib.path import Path as Curve
 from matplotlib.text import Text
 
 from semidense.cache import code_hash_of
+from semidense.cache.keys.recipe import short
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.provenance import Ancestor
 
@@ -212,8 +213,8 @@ def _text(box: Box, found: Sequence[Ancestor]) -> str:
     each = found[0]
     title = f"{product} x {len(found)}" if len(found) > 1 else product
     if each.entry is None:
-        return f"{title}\ndeleted since\n{each.digest[:12]}"
-    origin = "".join(f"\n{name} {value[:8]}" for name, value in each.origins.items() if name != "reader")
-    code = f"\ncode {code_hash_of(each.entry.recipe.code)[:8]}"
-    key = "" if len(found) > 1 else f"\n{each.entry.key[:12]}"
+        return f"{title}\ndeleted since\n{short(each.digest)}"
+    origin = "".join(f"\n{name} {short(value)}" for name, value in each.origins.items() if name != "reader")
+    code = f"\ncode {short(code_hash_of(each.entry.recipe.code))}"
+    key = "" if len(found) > 1 else f"\n{short(each.entry.key)}"
     return f"{title}\n{scene}{key}{origin if len(found) == 1 else ''}{code}"

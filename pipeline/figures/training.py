@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from semidense.pipeline.figures.colours import BLUE, ORANGE, QUIET, RED, SKY
 from semidense.pipeline.figures.drawing import disparity_scale, draw_classes, legend_below, none_patch, share_patch
+from semidense.pipeline.results.opening import recorded
 from semidense.stages.evaluation.declaration import STRIDE
 
 _SHOWN = 6
@@ -151,7 +152,7 @@ _COIN = float(np.log(2))
 def draw_network(figure: Figure, dataset: xr.Dataset) -> None:
     """Draw the loss of each training step."""
     figure.set_size_inches(10, 5)
-    _draw_loss(figure.subplots(), dataset["loss"].values, dataset.attrs.get("params", {}))
+    _draw_loss(figure.subplots(), dataset["loss"].values, recorded(dataset, "params"))
 
 
 def loss_name(params: Mapping[str, Any]) -> str:

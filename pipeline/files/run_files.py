@@ -32,10 +32,11 @@ from semidense.datasets.formats.pfm import write_pfm
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.figures.colours import confidence_rgb, disparity_rgb, disparity_span
 from semidense.pipeline.files.file_names import safe_names
-from semidense.pipeline.files.selection import Wanted, lineage, wanted
+from semidense.pipeline.files.selection import Wanted, wanted
 from semidense.pipeline.files.writing import explaining, save_png, writable_folder, write_rgb
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.results.metric_rows import SWEEP_THRESHOLD
+from semidense.pipeline.results.provenance import lineage
 from semidense.pipeline.results.result import Result
 from semidense.stages.catalog import STAGES
 from semidense.stages.metrics.stage import ROW

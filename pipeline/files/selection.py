@@ -1,11 +1,12 @@
-"""What a result was made from, and which of a run's results a user wants as files."""
+"""Which of a run's results a user wants as files, and how those files are called."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from semidense.pipeline.files.file_names import safe_names
-from semidense.pipeline.plan.plan import Made, Planned
-from semidense.pipeline.plan.steps import SPLIT, Step
+from semidense.pipeline.plan.plan import Made
+from semidense.pipeline.plan.steps import SPLIT
+from semidense.pipeline.results.provenance import lineage
 from semidense.pipeline.results.result import Result
 
 _THRESHOLD = "semidense.R="
@@ -27,30 +28,6 @@ class Wanted:
     def product(self) -> str:
         """The name of its product."""
         return self.made.step.product
-
-
-def lineage(
-    made: Mapping[str, Made | Planned], step_id: str, *, over_training: bool = False, up_to: str | None = None
-) -> list[Step]:
-    """Return a step and what it was made from, nearest first.
-
-    Args:
-        made: the results of a run, or the steps of a plan, by the step's id.
-        step_id: the step.
-        over_training: go on through the training scenes; without, only steps of the same scene and of the training
-            split are in it, one a product.
-        up_to: a product beyond which not to go.
-    """
-    found: dict[str, Step] = {}
-    waiting = [step_id]
-    for each in waiting:
-        if each not in found:
-            found[each] = step = made[each].step
-            if step.product == up_to:
-                continue
-            inputs = [ids for product, ids in step.inputs.items() if over_training or not step.takes_list(product)]
-            waiting += [each for ids in inputs for each in ids]
-    return list(found.values())
 
 
 def wanted(result: Result, products: Sequence[str]) -> list[Wanted]:

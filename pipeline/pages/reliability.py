@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from semidense.pipeline.figures.colours import BLUE, QUIET, SKY
 from semidense.pipeline.figures.drawing import new_figure
-from semidense.pipeline.pages.tally import Tally
-from semidense.stages.metrics import MASKS, THRESHOLDS
+from semidense.stages.metrics.errors import MASKS, THRESHOLDS
+from semidense.stages.metrics.tally import Tally
 
 _BINS = 10
 _FEWEST = 50

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.cache import Store
-from semidense.pipeline.pages.tally import Block, Tally
+from semidense.pipeline.figures.colours import view_rgb
 from semidense.pipeline.plan.images_and_truth import MASK_KINDS
+from semidense.stages.metrics.tally import Block, Tally
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +61,7 @@ class SceneMaps:
         return cls(
             size=(height, width),
             step=step,
-            left=_rgb(thinned(arrays["images"]["left"], step)) if "images" in arrays else None,
+            left=view_rgb(thinned(arrays["images"]["left"], step)) if "images" in arrays else None,
             disparity=maps.get("disparity"),
             confidence=maps.get("confidence"),
             truth=maps.get("truth"),
@@ -86,12 +87,6 @@ class SceneMaps:
             return None
         error: NDArray[np.float32] = np.abs(self.disparity - self.truth)
         return error
-
-
-def _rgb(view: NDArray[Any]) -> NDArray[np.uint8]:
-    """Return a view (y, x, band) of 8 or 16 bits as 8-bit colours; 16 bits are cut, for looking only."""
-    eight = (view >> 8).astype(np.uint8) if view.dtype == np.uint16 else view
-    return np.broadcast_to(eight, (*eight.shape[:2], 3)) if eight.shape[2] == 1 else eight
 
 
 SHOWN = 1_500_000

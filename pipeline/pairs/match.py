@@ -151,14 +151,12 @@ class Match:
         Raises:
             UsageError: if the pair has no calibration.
         """
+        from semidense.pipeline.figures.colours import view_rgb  # Matplotlib takes a second to load
+
         rows, columns = self.scene.size
-        centre = self.calibration.centre or ((columns - 1) / 2, (rows - 1) / 2)
-        colours = self.image[np.isfinite(self.depth)]
-        if colours.dtype == np.uint16:
-            colours = (colours // 257).astype(np.uint8)
-        known = self.calibration
-        placed = geometry.points(self.depth, known.focal, centre, known.focal_y, known.skew)
-        return placed, np.broadcast_to(colours, (len(colours), 3))
+        known, colours = self.calibration, view_rgb(self.image[np.isfinite(self.depth)])
+        centre = known.centre or ((columns - 1) / 2, (rows - 1) / 2)
+        return geometry.points(self.depth, known.focal, centre, known.focal_y, known.skew), colours
 
     @property
     def calibration(self) -> Calibration:

@@ -8,7 +8,9 @@ from functools import cache
 from pathlib import Path
 
 from semidense.cache import Change, Entry, Store, differences
+from semidense.cache.entries.index import Index
 from semidense.cache.keys.code import source_text
+from semidense.cache.keys.recipe import is_hash
 from semidense.cache.keys.sources import source_change
 from semidense.pipeline.plan.steps import Step
 
@@ -22,9 +24,7 @@ class Causes:
 
     def __init__(self, store: Store, entries: Iterable[Entry]) -> None:
         self._store = store
-        self._by_content: dict[tuple[str, str], Entry] = {}
-        for entry in entries:  # newest first
-            self._by_content.setdefault((entry.recipe.stage, entry.digest), entry)
+        self._index = Index(entries)
         self._code = cache(self._code_text)
 
     def of(self, step: Step, changes: Iterable[Change], above: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
@@ -67,7 +67,7 @@ class Causes:
     def _input(self, product: str, change: Change) -> Iterator[str]:
         """Follow an input to what made its content different."""
         for old, new in _pairs(change.old, change.new):
-            before, after = self._by_content.get((product, old)), self._by_content.get((product, new))
+            before, after = self._index.find(product, old), self._index.find(product, new)
             if before is None or after is None or before.key == after.key:
                 yield f"content of {product}: {_values(Change('', old, new))}"
                 continue
@@ -80,9 +80,9 @@ class Causes:
     def _code_text(self, module: str, change: Change) -> str:
         """Return file, function and lines of a change of code; without the old text, the module and its hashes."""
         file = f"{module.removeprefix('semidense.').replace('.', '/')}.py"
-        if change.old is None or not _is_hash(change.old):
+        if not is_hash(change.old):
             return f"code of {module} is now part of it"
-        if not _is_hash(change.new):
+        if not is_hash(change.new):
             return f"code of {module} is no longer part of it"
         old, new = self._store.kept_source(change.old), source_text(module)
         found = source_change(old, new) if old and new else None
@@ -105,10 +105,6 @@ def _pairs(old: object, new: object) -> Iterator[tuple[str, str]]:
 
 def _values(change: Change) -> str:
     return str(change).removeprefix(f"{change.field}: ")
-
-
-def _is_hash(value: object) -> bool:
-    return isinstance(value, str) and len(value) == 64 and set(value) <= set("0123456789abcdef")
 
 
 def _shortened(path: Path) -> str:

@@ -1,10 +1,15 @@
-"""From a cached product up to the images, weights and code that it was made from."""
+"""What a result was made from: in a cache up to the images, weights and code, in a plan step by step."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from semidense.cache import Entry, EntryNotFound, Store, code_hash_of
+from semidense.cache.entries.index import Content, Index, inputs_of
+from semidense.cache.keys.recipe import short
+from semidense.pipeline.plan.plan import Made, Planned
+from semidense.pipeline.plan.steps import Step
+from semidense.pipeline.results.text import time_text, value_text
 
 MOST = 3
 """Inputs of one product that are written out; of more, such as one a training scene, the rest is counted."""
@@ -29,7 +34,12 @@ class Ancestor:
     @property
     def scene(self) -> str:
         """Whose product it is; empty if that is not known any more."""
-        return self.entry.label.get("scene", "") if self.entry else ""
+        return _scene(self.entry) if self.entry else ""
+
+    @property
+    def contents(self) -> list[Content]:
+        """Product and digest of each of its inputs."""
+        return [(product, digest) for product, digests in self.inputs.items() for digest in digests]
 
     @property
     def origins(self) -> dict[str, str]:
@@ -61,6 +71,53 @@ class Ancestor:
         }
 
 
+class Provenance:
+    """What entries of a cache were made from, and what was made from them; give it all entries of the cache.
+
+    Attributes:
+        entries: the first made first.
+    """
+
+    def __init__(self, entries: Iterable[Entry]) -> None:
+        self.entries = sorted(entries, key=lambda entry: entry.created)
+        self.index = Index(self.entries)
+        self._made_from: dict[Content, list[Entry]] = {}
+        for entry in self.entries:
+            for content in single_inputs(entry):
+                self._made_from.setdefault(content, []).append(entry)
+
+    def made_from(self, content: Content) -> Sequence[Entry]:
+        """Return what was made from a product alone, or from it and other single products."""
+        return self._made_from.get(content, ())
+
+    def chain(self, entry: Entry) -> dict[str, Entry]:
+        """Return an entry and what it was made from that is still there, nearest first, one a product.
+
+        Scenes that a network learnt from are left out.
+        """
+        found = {entry.recipe.stage: entry}
+        waiting = [entry]
+        for each in waiting:
+            for product, digest in single_inputs(each):
+                above = self.index.find(product, digest, scene=_scene(each))
+                if above and product not in found:
+                    found[product] = above
+                    waiting.append(above)
+        return found
+
+    def ancestors(self, entry: Entry) -> list[Ancestor]:
+        """Return an entry and all it was made from, nearest first, each once."""
+        found = {(entry.recipe.stage, entry.digest): _ancestor(entry)}
+        waiting = list(found.values())
+        for child in waiting:
+            for product, digest in child.contents:
+                if (product, digest) not in found:
+                    above = self.index.find(product, digest, scene=child.scene)
+                    found[product, digest] = _ancestor(above) if above else Ancestor(product, digest, None, {})
+                    waiting.append(found[product, digest])
+        return waiting
+
+
 def ancestry(store: Store, key: str) -> list[Ancestor]:
     """Return an entry and all it was made from, nearest first, each once.
 
@@ -71,38 +128,44 @@ def ancestry(store: Store, key: str) -> list[Ancestor]:
     entry = store.find(key)
     if entry is None:
         raise EntryNotFound(f"no entry has the key {key} in {store.root}")
-    known: dict[tuple[str, str], list[Entry]] = {}
-    for each in store.entries():
-        known.setdefault((each.recipe.stage, each.digest), []).append(each)
-    found = {(entry.recipe.stage, entry.digest): _ancestor(entry)}
-    waiting = [found[entry.recipe.stage, entry.digest]]
-    for child in waiting:
-        for product, digest in _inputs(child):
-            if (product, digest) not in found:
-                nearest = _nearest(known.get((product, digest), []), child.scene)
-                found[product, digest] = _ancestor(nearest) if nearest else Ancestor(product, digest, None, {})
-                waiting.append(found[product, digest])
-    return waiting
+    return Provenance(store.entries()).ancestors(entry)
+
+
+def single_inputs(entry: Entry) -> list[Content]:
+    """Return product and digest of each single product that an entry was made from."""
+    return [(product, content) for product, content in entry.recipe.inputs.items() if isinstance(content, str)]
 
 
 def _ancestor(entry: Entry) -> Ancestor:
-    inputs = {product: tuple(_digests(value)) for product, value in entry.recipe.inputs.items()}
-    return Ancestor(entry.recipe.stage, entry.digest, entry, inputs)
+    return Ancestor(entry.recipe.stage, entry.digest, entry, inputs_of(entry.recipe))
 
 
-def _digests(value: object) -> Iterable[str]:
-    if isinstance(value, str):
-        return [value]
-    return [str(each) for each in (value.values() if isinstance(value, dict) else value)]  # type: ignore[attr-defined]
+def _scene(entry: Entry) -> str:
+    return entry.label.get("scene", "")
 
 
-def _inputs(ancestor: Ancestor) -> Iterator[tuple[str, str]]:
-    return ((product, digest) for product, digests in ancestor.inputs.items() for digest in digests)
+def lineage(
+    made: Mapping[str, Made | Planned], step_id: str, *, over_training: bool = False, up_to: str | None = None
+) -> list[Step]:
+    """Return a step of a run or a plan, and what it is made from, nearest first.
 
-
-def _nearest(candidates: list[Entry], scene: str) -> Entry | None:
-    """Return the entry of the same scene if there is one, else the newest: equal content may have several."""
-    return max(candidates, key=lambda each: (each.label.get("scene") == scene, each.created), default=None)
+    Args:
+        made: the results of a run, or the steps of a plan, by the step's id.
+        step_id: the step.
+        over_training: go on through the training scenes; without, only steps of the same scene and of the training
+            split are in it, one a product.
+        up_to: a product beyond which not to go.
+    """
+    found: dict[str, Step] = {}
+    waiting = [step_id]
+    for each in waiting:
+        if each not in found:
+            found[each] = step = made[each].step
+            if step.product == up_to:
+                continue
+            inputs = [ids for product, ids in step.inputs.items() if over_training or not step.takes_list(product)]
+            waiting += [each for ids in inputs for each in ids]
+    return list(found.values())
 
 
 def tree_lines(chain: list[Ancestor]) -> Iterator[str]:
@@ -117,7 +180,7 @@ def tree_lines(chain: list[Ancestor]) -> Iterator[str]:
         yield f"{indent}{_headline(each)}{' (as above)' if again and each.inputs else ''}"
         if again:
             return
-        yield from (f"{indent}    {name}: {_short(value)}" for name, value in _details(each).items())
+        yield from (f"{indent}    {name}: {value_text(value)}" for name, value in _details(each).items())
         for product, digests in each.inputs.items():
             for digest in digests[:MOST]:
                 yield from lines(by_content[product, digest], depth + 1)
@@ -129,8 +192,8 @@ def tree_lines(chain: list[Ancestor]) -> Iterator[str]:
 
 def _headline(each: Ancestor) -> str:
     if each.entry is None:
-        return f"{each.product}, digest {each.digest[:12]}: its entry was deleted since"
-    return f"{each.product} of {each.scene}, key {each.entry.key[:12]}, made {each.entry.created[:19]}"
+        return f"{each.product}, digest {short(each.digest)}: its entry was deleted since"
+    return f"{each.product} of {each.scene}, key {short(each.entry.key)}, made {time_text(each.entry.created)}"
 
 
 def _details(each: Ancestor) -> dict[str, str]:
@@ -142,18 +205,10 @@ def _details(each: Ancestor) -> dict[str, str]:
         for name, value in each.entry.recipe.params.items()
         if name not in ("files", "shipped", "reader", "tiles")
     }
-    settings = ", ".join(f"{name}={_plain(value)}" for name, value in params.items())
+    settings = ", ".join(f"{name}={value_text(value)}" for name, value in params.items())
     code = each.entry.recipe.code
     return {
         **each.origins,
         **({"settings": settings} if settings else {}),
-        "code": f"{code_hash_of(code)[:12]}, {len(code)} modules",
+        "code": f"{short(code_hash_of(code))}, {len(code)} modules",
     }
-
-
-def _plain(value: object) -> str:
-    return " ".join(map(str, value)) if isinstance(value, list) else str(value)
-
-
-def _short(value: str) -> str:
-    return value[:12] if len(value) == 64 and set(value) <= set("0123456789abcdef") else value

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
+from semidense.stages.disparity.right_view import agreeing
 
 Planes = Callable[[int, slice, slice], NDArray[np.float32]]
 """``costs(d, left, right)``: float32 (y, column), the cost of each left column of a slice with its right column."""
@@ -42,22 +43,7 @@ def match_windows(
         plane = box_mean(costs(d, columns, seen), window // 2)
         _keep_least(plane, d, left[:, columns], left_least[:, columns])
         _keep_least(plane, d, right[:, seen], right_least[:, seen])
-    return {"dense": left, "disparity": keep_consistent(left, right, tolerance)}
-
-
-def keep_consistent(left: NDArray[np.float32], right: NDArray[np.float32], tolerance: float) -> NDArray[np.float32]:
-    """Return the left disparities to which the right view's answer differs by at most ``tolerance`` px; NaN elsewhere.
-
-    >>> left, right = np.array([[np.nan, 1, 1]], np.float32), np.array([[1, 0, 0]], np.float32)
-    >>> keep_consistent(left, right, tolerance=0.5).tolist()
-    [[nan, 1.0, nan]]
-    """
-    rows, columns = np.nonzero(np.isfinite(left))
-    answers = right[rows, columns - np.rint(left[rows, columns]).astype(np.int64)]
-    agree = np.abs(left[rows, columns] - answers) <= tolerance
-    kept = np.full_like(left, np.nan)
-    kept[rows[agree], columns[agree]] = left[rows[agree], columns[agree]]
-    return kept
+    return {"dense": left, "disparity": agreeing(left, right, tolerance)}
 
 
 def box_mean(values: NDArray[np.float32], radius: int) -> NDArray[np.float32]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from semidense.stages.stage import Arrays, Inputs, Output, Params, Stage, StageError
+from semidense.stages.stage import Arrays, Inputs, Output, Params, Stage, StageError, require_share
 
 
 class SemidenseParams(Params):
@@ -117,16 +117,6 @@ def threshold_for_error(max_error: float, disparity: NDArray[Any], probability: 
     wrong, kept = np.cumsum((counts * (1 - values))[::-1]), np.cumsum(counts[::-1])
     reached = np.flatnonzero(wrong <= max_error * kept)
     return float(values[::-1][reached[-1]]) if reached.size else 1.0
-
-
-def require_share(name: str, value: float) -> None:
-    """Refuse a number outside [0, 1].
-
-    Raises:
-        StageError: naming it and its value; NaN is outside.
-    """
-    if not 0 <= value <= 1:
-        raise StageError(f"{name} is {value:g}, expected a number in [0, 1]")
 
 
 def compute_semidense(params: SemidenseParams, inputs: Inputs) -> Arrays:

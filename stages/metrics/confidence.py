@@ -1,4 +1,4 @@
-"""How well a confidence ranks pixels: the area under the error curve, and the curve itself.
+"""How well a confidence ranks pixels: the area under the error curve, and points of the curve.
 
 Sort the n pixels by falling confidence. Keeping the first k, with W_k wrong among them, gives density ``k / n`` and
 error ``W_k / k``. Pixels of equal confidence have no order: W_k is then its mean over all orders of theirs, which is a
@@ -7,22 +7,19 @@ straight line between the ends of their group. A NaN confidence ranks below ever
 Source: Hu & Mordohai, "A quantitative evaluation of confidence measures for stereo vision", PAMI 2012.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.evaluation.filtering import require_share
-from semidense.stages.metrics.errors import Errors, counted, require_equal
-from semidense.stages.stage import StageError
+from semidense.stages.stage import StageError, require_share
 
 
 @dataclass(frozen=True)
 class Ranking:
-    """Pixels sorted by confidence, once for all the questions put to it.
+    """Pixels sorted by confidence, once for every threshold on the error.
 
     Attributes:
         order: (n,) indices of the pixels, most confident first.
@@ -153,63 +150,3 @@ def error_at_density(confidence: NDArray[Any], correct: NDArray[np.bool_], densi
         return float("nan")
     kept = density * wrong.size
     return 100 * float(np.interp(kept, np.arange(wrong.size + 1), np.r_[0, wrong])) / kept
-
-
-class ErrorCurve(NamedTuple):
-    """What a threshold on the confidence buys: one entry a threshold.
-
-    Attributes:
-        R: least confidence that is kept, in [0, 1].
-        bad: percentage (0-100) of wrong pixels among the kept; NaN where none is kept.
-        invalid: percentage (0-100) of the pixels that are not kept.
-    """
-
-    R: NDArray[np.float64]
-    bad: NDArray[np.float64]
-    invalid: NDArray[np.float64]
-
-
-def error_curve(
-    confidence: NDArray[Any],
-    disparity: NDArray[Any],
-    truth: NDArray[Any],
-    mask: NDArray[np.bool_],
-    threshold: float,
-    Rs: Sequence[float],
-) -> ErrorCurve:
-    """Return error against density for every R, from one sort.
-
-    The same figures as ``bad`` and ``invalid`` of ``keep_confident(disparity, confidence, R)``, one R after another.
-
-    Args:
-        confidence: (y, x) float in [0, 1], NaN where there is none.
-        disparity: (y, x) float, px, NaN unknown; before filtering.
-        truth: (y, x) float, px, not finite where unknown.
-        mask: (y, x) bool.
-        threshold: error above which a pixel is wrong, px.
-        Rs: the thresholds on the confidence, in [0, 1], in any order.
-
-    Raises:
-        StageError: if an R is outside [0, 1], the shapes differ or the mask is not bool.
-    """
-    for R in Rs:
-        require_share("R", R)
-    require_equal("confidence", confidence, truth)
-    error, sure = Errors.of(disparity, truth, mask).absolute, confidence[counted(truth, mask)]
-    usable = np.isfinite(error) & ~np.isnan(sure)
-    order = np.argsort(sure[usable])
-    first = np.searchsorted(sure[usable][order], np.asarray(Rs, confidence.dtype))
-    wrong_below = np.r_[0, np.cumsum(error[usable][order] > threshold)]
-    kept = order.size - first
-    return ErrorCurve(
-        np.asarray(Rs, np.float64),
-        _percent(wrong_below[-1] - wrong_below[first], kept),
-        _percent(error.size - kept, error.size),
-    )
-
-
-def _percent(part: NDArray[Any], whole: NDArray[Any] | int) -> NDArray[np.float64]:
-    """Return 100 part / whole, NaN where the whole is 0."""
-    share = np.full(part.shape, np.nan)
-    np.divide(100 * part, whole, out=share, where=np.greater(whole, 0))
-    return share

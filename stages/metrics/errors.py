@@ -16,13 +16,17 @@ from numpy.typing import NDArray
 
 from semidense.stages.stage import Array, StageError
 
+MASKS = ("nonocc", "all")
+"""The pixels that count: those that both views see, and all; of both only those whose truth is known."""
+THRESHOLDS = (0.5, 1.0, 2.0, 4.0)
+"""Errors above which a pixel is wrong, px of the image at hand."""
 QUANTILES = {"A50": 0.50, "A90": 0.90, "A95": 0.95, "A99": 0.99}
 """Shares of the reported pixels whose largest error is given."""
 
 
 @dataclass(frozen=True)
 class Errors:
-    """The absolute errors of a map, taken once for all the questions put to them.
+    """The absolute errors of a map, worked out once; every figure of a map is made from them.
 
     Attributes:
         absolute: (pixel,) float64, px, of each pixel that counts, in the order of the array; infinity where nothing is
@@ -63,22 +67,14 @@ class Errors:
         return float(np.sqrt(np.mean(self.reported**2))) if self.reported.size else float("nan")
 
     def quantiles(self) -> dict[str, float]:
-        """Return the error quantiles of the reported pixels."""
+        """Return ``A50``, ``A90``, ``A95`` and ``A99`` of the reported pixels, px.
+
+        ``A90`` is the smallest error that occurs and that at least 90 % of them do not exceed (no interpolation).
+        """
         if not self.reported.size:
             return dict.fromkeys(QUANTILES, float("nan"))
         found = np.quantile(self.reported, list(QUANTILES.values()), method="inverted_cdf")
         return dict(zip(QUANTILES, found.tolist(), strict=True))
-
-
-def bad(disparity: NDArray[Any], truth: NDArray[Any], mask: NDArray[np.bool_], threshold: float) -> float:
-    """Return the percentage (0-100) of *reported* pixels that are off by more than ``threshold`` px.
-
-    NaN if nothing is reported.
-
-    >>> bad(np.array([1.0, 2.0, np.nan]), np.array([1.0, 4.0, 3.0]), np.ones(3, bool), threshold=1)
-    50.0
-    """
-    return Errors.of(disparity, truth, mask).bad(threshold)
 
 
 def raw_bad(disparity: NDArray[Any], truth: NDArray[Any], mask: NDArray[np.bool_], threshold: float) -> float:
@@ -92,31 +88,9 @@ def raw_bad(disparity: NDArray[Any], truth: NDArray[Any], mask: NDArray[np.bool_
     return Errors.of(disparity, truth, mask).raw_bad(threshold)
 
 
-def invalid(disparity: NDArray[Any], truth: NDArray[Any], mask: NDArray[np.bool_]) -> float:
-    """Return the percentage (0-100) of pixels that have no disparity; NaN if no pixel counts."""
-    return Errors.of(disparity, truth, mask).invalid()
-
-
-def avgerr(disparity: NDArray[Any], truth: NDArray[Any], mask: NDArray[np.bool_]) -> float:
-    """Return the mean absolute error of the reported pixels, px; NaN if nothing is reported."""
-    return Errors.of(disparity, truth, mask).avgerr()
-
-
-def rms(disparity: NDArray[Any], truth: NDArray[Any], mask: NDArray[np.bool_]) -> float:
-    """Return the root of the mean squared error of the reported pixels, px; NaN if nothing is reported."""
-    return Errors.of(disparity, truth, mask).rms()
-
-
-def error_quantiles(disparity: NDArray[Any], truth: NDArray[Any], mask: NDArray[np.bool_]) -> dict[str, float]:
-    """Return ``A50``, ``A90``, ``A95`` and ``A99`` of the reported pixels, px.
-
-    ``A90`` is the smallest error that occurs and that at least 90 % of the reported pixels do not exceed (no
-    interpolation). NaN if nothing is reported.
-
-    >>> error_quantiles(np.arange(1.0, 101.0), np.zeros(100), np.ones(100, bool))
-    {'A50': 50.0, 'A90': 90.0, 'A95': 95.0, 'A99': 99.0}
-    """
-    return Errors.of(disparity, truth, mask).quantiles()
+def pixels_of(nonocc: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], ...]:
+    """Return the pixels (y, x) of each of ``MASKS``, given those that both views see."""
+    return nonocc, np.ones_like(nonocc)
 
 
 def counted(truth: NDArray[Any], mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -1,41 +1,17 @@
 """The figures of one scene: the product ``metrics`` and its rows for machines."""
 
-import hashlib
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from semidense.stages.metrics.confidence import Ranking, optimal_auc
-from semidense.stages.metrics.errors import QUANTILES, Errors, counted, require_equal
+from semidense.stages.metrics.errors import MASKS, QUANTILES, THRESHOLDS, Errors, pixels_of, require_equal
+from semidense.stages.metrics.ranking import AXES, DIMS, RANKED
 from semidense.stages.stage import Array, Arrays, Inputs, NoParams, Output, Stage
 
-MASKS = ("nonocc", "all")
-"""The order of the mask axis: pixels visible in both views, and all pixels; both only where the truth is known."""
-THRESHOLDS = (0.5, 1.0, 2.0, 4.0)
-"""The order of the threshold axis, px of the image at hand."""
-
-FIGURES = {
-    "pixels": ("int64", "1", "pixels of the mask with a known truth"),
-    "raw_bad": ("float64", "%", "wrong or unreported pixels of the map before filtering"),
-    "bad": ("float64", "%", "wrong pixels among those the filtered map reports"),
-    "invalid": ("float64", "%", "pixels that the filtered map does not report"),
-    "avgerr": ("float64", "px", "mean absolute error of the filtered map"),
-    "rms": ("float64", "px", "root mean squared error of the filtered map"),
-    **{
-        name: ("float64", "px", f"error that {share:.0%} of the filtered map keep to")
-        for name, share in QUANTILES.items()
-    },
-    "auc": ("float64", "1", "area under the error curve of the confidence over the map before filtering"),
-    "auc_optimal": ("float64", "1", "the area that a perfect confidence would reach"),
-}
-"""The order of the figure axis; dtype, unit and meaning of each. Those that know no threshold are the same at each."""
-_known: dict[bytes, list[list[dict[str, float]]]] = {}
-"""Figures of maps before filtering, by a hash of all that they are made from."""
-_MOST_KNOWN = 100
-
-ROW = ("raw_bad", "bad", "invalid", "avgerr", "rms", "auc", "auc_optimal")
+FIGURES = ("pixels", "raw_bad", "bad", "invalid", "avgerr", "rms", *QUANTILES, "auc", "auc_optimal")
+"""The order of the figure axis. Those that know no threshold are the same at each."""
+ROW = tuple(name for name in FIGURES if name not in ("pixels", *QUANTILES))
 """The figures of a machine-readable row, in order."""
 
 
@@ -64,91 +40,39 @@ def metric_rows(scene: str, method: str, R: float | None, arrays: Arrays) -> lis
     ]
 
 
-def by_name(figures: Array) -> dict[str, Array]:
-    """Return each of ``FIGURES``, in its own dtype, of an array (figure, mask, threshold)."""
-    return {name: values.astype(about[0]) for (name, about), values in zip(FIGURES.items(), figures, strict=True)}
+def by_name(figures: Array, names: Sequence[str] = FIGURES) -> dict[str, Array]:
+    """Return each figure of an array (figure, mask, threshold) by its name; ``pixels`` as int64."""
+    found = dict(zip(names, figures, strict=True))
+    return found | {"pixels": found["pixels"].astype(np.int64)}
 
 
 def compute_metrics(_: NoParams, inputs: Inputs) -> Arrays:
     """Compute the product ``metrics``: each of ``FIGURES`` for each of ``MASKS`` and ``THRESHOLDS``.
 
     Raises:
-        StageError: if a map has not the shape of the ground truth.
+        StageError: if the map has not the shape of the ground truth.
     """
-    maps = {
-        "semidense": inputs["semidense"]["disparity"],
-        "disparity": inputs["disparity"]["disparity"],
-        "confidence": inputs["confidence"]["confidence"],
-        "nonocc": inputs["truth"]["nonocc"],
-    }
-    truth: Array = inputs["truth"]["disparity"]
-    for name, array in maps.items():
-        require_equal(name, array, truth)
-    masks = (maps.pop("nonocc"), np.ones(truth.shape, bool))
-    semidense = maps.pop("semidense")
-    raw = _raw_figures(**maps, truth=truth, masks=masks)
-    table = [
-        [cell | filtered for cell, filtered in zip(row, _filtered_figures(semidense, truth, mask), strict=True)]
-        for row, mask in zip(raw, masks, strict=True)
-    ]
-    return {
-        "figures": np.array([[[cell[name] for cell in row] for row in table] for name in FIGURES], np.float64),
-    }
+    semidense, truth = inputs["semidense"]["disparity"], inputs["truth"]["disparity"]
+    require_equal("semidense", semidense, truth)
+    kept = [_kept(Errors.of(semidense, truth, mask)) for mask in pixels_of(inputs["truth"]["nonocc"])]
+    figures = dict(zip(RANKED, inputs["ranking"]["figures"], strict=True))
+    figures |= {name: np.array([each[name] for each in kept]) for name in kept[0]}
+    return {"figures": np.array([figures[name] for name in FIGURES], np.float64)}
 
 
-def _raw_figures(
-    disparity: Array, confidence: Array, truth: Array, masks: Sequence[NDArray[np.bool_]]
-) -> list[list[dict[str, float]]]:
-    """Return the figures that no filtering changes, by mask and threshold.
+def _kept(errors: Errors) -> dict[str, list[float]]:
+    """Return each figure of the filtered map, at each threshold."""
+    same = {"invalid": errors.invalid(), "avgerr": errors.avgerr(), "rms": errors.rms(), **errors.quantiles()}
+    at_each = {name: [value] * len(THRESHOLDS) for name, value in same.items()}
+    return at_each | {"bad": [errors.bad(threshold) for threshold in THRESHOLDS]}
 
-    Ranking the pixels is most of the work, and a sweep over R asks for the same each time: what was worked
-    out for these very arrays is taken again.
-    """
-    digest = hashlib.blake2b()
-    for array in (disparity, confidence, truth, masks[0]):
-        digest.update(f"{array.dtype}{array.shape}".encode())
-        digest.update(array.tobytes())
-    found = _known.get(digest.digest())
-    if found is None:
-        found = [_raw_of_mask(disparity, confidence, truth, mask) for mask in masks]
-        if len(_known) >= _MOST_KNOWN:
-            _known.clear()
-        _known[digest.digest()] = found
-    return found
-
-
-def _raw_of_mask(disparity: Array, confidence: Array, truth: Array, mask: NDArray[np.bool_]) -> list[dict[str, float]]:
-    """Return the figures of the map before filtering, at each threshold."""
-    raw = Errors.of(disparity, truth, mask)
-    ranking = Ranking.of(confidence[counted(truth, mask)])
-    return [
-        {
-            "pixels": raw.absolute.size,
-            "raw_bad": raw.raw_bad(threshold),
-            "auc": ranking.auc(raw.absolute <= threshold),
-            "auc_optimal": optimal_auc(raw.raw_bad(threshold) / 100),
-        }
-        for threshold in THRESHOLDS
-    ]
-
-
-def _filtered_figures(semidense: Array, truth: Array, mask: NDArray[np.bool_]) -> list[dict[str, float]]:
-    """Return the figures of the filtered map, at each threshold."""
-    filtered = Errors.of(semidense, truth, mask)
-    same = {"invalid": filtered.invalid(), "avgerr": filtered.avgerr(), "rms": filtered.rms(), **filtered.quantiles()}
-    return [same | {"bad": filtered.bad(threshold)} for threshold in THRESHOLDS]
-
-
-_AXES = f"{', '.join(MASKS)}; wrong above {', '.join(f'{threshold:g}' for threshold in THRESHOLDS)} px"
 
 METRICS = Stage(
     product="metrics",
-    inputs=("semidense", "disparity", "confidence", "truth"),
-    outputs=(
-        # One array: as one each, the figures would take more time to store than to work out.
-        Output("figures", ("figure", "mask", "threshold"), "float64", "1", f"{', '.join(FIGURES)}; of {_AXES}"),
-    ),
+    inputs=("semidense", "truth", "ranking"),
+    # One array: as one each, the figures would take more time to store than to work out.
+    outputs=(Output("figures", DIMS, "float64", "1", f"{', '.join(FIGURES)}; {AXES}"),),
     compute="semidense.stages.metrics.stage:compute_metrics",
 )
-"""The figures of a scene, in the order of ``FIGURES``, of ``MASKS`` and of ``THRESHOLDS``. ``truth`` has ``disparity``
-(y, x) float32, NaN unknown, and ``nonocc`` (y, x) bool. Not tiled: a quantile and a ranking are not sums over tiles."""
+"""The figures of a scene before and after filtering. ``truth`` as of ``RANKING``. Not tiled: a quantile is not a sum
+over tiles."""

@@ -29,7 +29,7 @@ from semidense.pipeline.api import Task, run
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.result import Result
 from semidense.stages.matching.net import MatchingNet
-from semidense.stages.metrics import auc
+from semidense.stages.metrics.confidence import auc
 from tests.tiny import SETTINGS, SPEC
 
 TINY = "synthetic:train=0,test=1,height=48,width=64,disparities=4"

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from semidense.datasets.occlusion import left_right_check, warped_truth_mask
+from tests.stages.left_right import CASES
 
 NAN = np.nan
 YES, NO = True, False
@@ -11,20 +12,9 @@ def row(*values: float) -> np.ndarray:
     return np.array([values], np.float32)
 
 
-@pytest.mark.parametrize(
-    "left, right, expected",
-    [
-        pytest.param(row(0, 0, 0), row(0, 0, 0), [YES, YES, YES], id="at infinity"),
-        pytest.param(row(1, 1, 1), row(1, 1, 1), [NO, YES, YES], id="the first pixel lands outside"),
-        pytest.param(row(-1, -1, -1), row(-1, -1, -1), [YES, YES, NO], id="negative: the last lands outside"),
-        pytest.param(row(NAN, 0, 0), row(0, 0, NAN), [NO, YES, NO], id="unknown in either view"),
-        pytest.param(row(0, 0, 0, 2, 2), row(0, 2, 2, 0, 0), [YES, NO, NO, YES, YES], id="covered by a nearer pixel"),
-        pytest.param(row(0, 1, 0), row(0, 1, 1), [YES, YES, YES], id="a difference of the tolerance is let pass"),
-        pytest.param(row(0.6, 0.6, 0.6), row(0.6, 9, 0.6), [NO, YES, NO], id="read at the nearest column"),
-    ],
-)
-def test_left_right_check_by_hand(left: np.ndarray, right: np.ndarray, expected: list[bool]) -> None:
-    assert left_right_check(left, right).tolist() == [expected]
+@pytest.mark.parametrize(("left", "right", "confirmed"), CASES)
+def test_left_right_check_by_hand(left: list[float], right: list[float], confirmed: list[bool]) -> None:
+    assert left_right_check(row(*left), row(*right)).tolist() == [confirmed]
 
 
 def test_left_right_check_takes_a_tolerance() -> None:

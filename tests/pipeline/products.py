@@ -7,7 +7,9 @@ import xarray as xr
 
 from semidense.stages.evaluation.calibration.declaration import BINS
 from semidense.stages.evaluation.calibration.table import EDGES, probability
-from semidense.stages.metrics.stage import FIGURES, THRESHOLDS
+from semidense.stages.metrics.errors import THRESHOLDS
+from semidense.stages.metrics.ranking import RANKED
+from semidense.stages.metrics.stage import FIGURES
 
 N = np.nan
 DISPARITY = np.array(
@@ -78,7 +80,7 @@ def network() -> xr.Dataset:
 
 
 def shipped() -> xr.Dataset:
-    return network().assign_attrs(params={"shipped": "0123"})
+    return network().assign_attrs(params='{"shipped": "0123"}')
 
 
 def costvolume() -> xr.Dataset:
@@ -115,6 +117,10 @@ def metrics() -> xr.Dataset:
     figures["pixels"] = (("mask", "threshold"), np.full((2, 4), 1234))
     figures["bad"] = (("mask", "threshold"), np.full((2, 4), N))
     return xr.Dataset(figures, coords={"threshold": list(THRESHOLDS)})
+
+
+def ranking() -> xr.Dataset:
+    return metrics()[list(RANKED)]
 
 
 def survey() -> xr.Dataset:
@@ -160,5 +166,6 @@ PRODUCTS: dict[str, Callable[[], xr.Dataset]] = {
     "right_disparity": disparity,
     "refined": disparity,
     "filled": disparity,
+    "ranking": ranking,
     "metrics": metrics,
 }

@@ -9,7 +9,7 @@ from semidense.pipeline import api
 from semidense.pipeline.api import Task, open_store, parse_thresholds
 from semidense.pipeline.plan.config import Settings
 from semidense.pipeline.plan.errors import UsageError
-from semidense.pipeline.results.opening import open_product
+from semidense.pipeline.results.opening import open_product, recorded
 from semidense.pipeline.results.result import Result
 
 MakePair = Callable[[Path], Path]
@@ -113,10 +113,10 @@ def test_an_opened_volume_has_names_coordinates_units_and_provenance(trained: Re
     }  # fmt: skip
     assert costs["cost"].sel(y=10, x=20, d=3).size == 1
     assert costs.attrs["stage"] == "costvolume"
-    assert costs.attrs["params"]["d_max"] == 8
-    assert costs.attrs["inputs"]["matching_net"] == trained.find("matching_net").digest
-    assert "semidense.stages.matching.cost_volume" in costs.attrs["code"]
-    assert costs.attrs["extras"]["configuration"]["matching_net"]["steps"] == 2
+    assert recorded(costs, "params")["d_max"] == 8
+    assert recorded(costs, "inputs")["matching_net"] == trained.find("matching_net").digest
+    assert "semidense.stages.matching.cost_volume" in recorded(costs, "code")
+    assert recorded(costs, "extras")["configuration"]["matching_net"]["steps"] == 2
 
 
 def test_a_volume_is_read_when_it_is_needed(trained: Result) -> None:
@@ -248,7 +248,7 @@ def test_results_and_plans_are_one_line(trained: Result, trained_task: Task) -> 
     plan = api.status(trained_task)
     texts = [repr(each) for each in (trained, plan, plan.steps[0], plan.steps[0].step, trained.find("metrics"))]
     assert max(map(len, texts)) < 100
-    assert texts[0] == "<Result of test-0: 26 products made, 0 reused>"
+    assert texts[0] == "<Result of test-0: 27 products made, 0 reused>"
     assert texts[1:] == [
         "<Plan: 26 products, 0 to make>", "<images of test-0: hit>", "<Step images of test-0>",
         "<metrics of test-0: made>",

@@ -51,7 +51,7 @@ def test_the_installed_command_is_this_one() -> None:
 def test_results_go_to_stdout_and_notes_to_stderr(command: Command, trained: Result, tmp_path: Path) -> None:
     ran = command("run", *TRAINED, "--cache", trained.store.root, cwd=tmp_path)
     assert ran.code == 0
-    assert ran.out.splitlines()[-1] == "reused 26 products, made nothing"
+    assert ran.out.splitlines()[-1] == "reused 27 products, made nothing"
     assert {line.split(":")[0] for line in ran.err.splitlines()} == {"note"}
     assert list(tmp_path.iterdir()) == [], "nothing is written where one stands"
 

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from semidense.stages.evaluation.filtering import keep_confident
-from semidense.stages.metrics import avgerr, bad, invalid, rms
+from semidense.stages.metrics.errors import Errors
 from tests.handmade import Handmade, handmade, judge
 from tests.system.conftest import NARROW, WIDE, Seen, serving
 
@@ -136,14 +136,15 @@ def test_the_slider_changes_map_and_figures(seen: Seen, small: Running, R: float
     kept = keep_confident(disparity, small.confidences[0], R)
     np.testing.assert_array_equal(array(seen, "kept-data", "disparity"), kept.ravel())
     if np.isfinite(kept).any():
+        errors = Errors.of(kept, truth, nonocc)
         assert told(seen) == {
-            "bad": f"{bad(kept, truth, nonocc, 1):.2f}",
-            "invalid": f"{invalid(kept, truth, nonocc):.2f}",
-            "avgerr": f"{avgerr(kept, truth, nonocc):.3f}",
-            "rms": f"{rms(kept, truth, nonocc):.3f}",
+            "bad": f"{errors.bad(1):.2f}",
+            "invalid": f"{errors.invalid():.2f}",
+            "avgerr": f"{errors.avgerr():.3f}",
+            "rms": f"{errors.rms():.3f}",
         }
         point = seen.page.evaluate(f"{model('point')}.data")
-        assert point["invalid"][0] == pytest.approx(invalid(kept, truth, nonocc))
+        assert point["invalid"][0] == pytest.approx(errors.invalid())
     else:
         assert told(seen)["bad"] == "none"
 

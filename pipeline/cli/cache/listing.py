@@ -11,12 +11,13 @@ from rich.progress import Progress
 from rich.table import Table
 
 from semidense.cache import Entry, Store
+from semidense.cache.keys.recipe import short
 from semidense.cache.upkeep.gc import last_used
 from semidense.cache.upkeep.verify import size, verify
 from semidense.pipeline.api import open_store
 from semidense.pipeline.cli.console import print_json
 from semidense.pipeline.plan.errors import UsageError
-from semidense.pipeline.results.settings import Belonging
+from semidense.pipeline.results.settings import Settings
 from semidense.pipeline.results.text import bytes_text, results
 
 
@@ -76,12 +77,12 @@ def _only(entries: Iterable[Entry], start: str) -> Entry:
 def list_entries(folder: Path | None, selection: Selection, as_json: bool) -> None:
     """Print a line an entry, oldest first, with the settings that it belongs to."""
     store = open_store(folder)
-    entries, belonging = selection.of(store), Belonging(store.entries())
+    entries, settings = selection.of(store), Settings(store.entries())
     if as_json:
         names = ("key", "digest", "created", "seconds", "size")
         rows = [
             {**entry.label, **{name: getattr(entry, name) for name in names}, "last_used": _used(store, entry)}
-            | {"settings": belonging.text(entry)}
+            | {"settings": settings.text(entry)}
             for entry in entries
         ]
         print_json({"entries": rows})
@@ -92,7 +93,7 @@ def list_entries(folder: Path | None, selection: Selection, as_json: bool) -> No
     for entry in entries:
         label = [escape(entry.label.get(name, "")) for name in ("product", "dataset", "scene")]
         times = (_age(entry.created), _age(_used(store, entry)), f"{entry.seconds:.2f} s")
-        table.add_row(*label, bytes_text(entry.size), *times, entry.key[:12], escape(_cut(belonging.text(entry))))
+        table.add_row(*label, bytes_text(entry.size), *times, short(entry.key), escape(_cut(settings.text(entry))))
     console = results()
     console.print(table)
     console.print(f"{len(entries)} entries, {bytes_text(sum(entry.size for entry in entries))}")
@@ -123,7 +124,7 @@ def verify_entries(folder: Path | None, selection: Selection, as_json: bool) -> 
     console = results()
     for key, reason in report.damaged.items():
         console.print(
-            f"damaged {key[:12]}: {reason}; it will be moved to quarantine and made again when it is needed",
+            f"damaged {short(key)}: {reason}; it will be moved to quarantine and made again when it is needed",
             markup=False,
         )
     for name, reason in report.quarantined.items():

@@ -6,7 +6,7 @@ from semidense.cache.upkeep.archive import export_entries, import_entries
 from semidense.pipeline.api import open_store
 from semidense.pipeline.cli.cache.listing import Selection
 from semidense.pipeline.cli.console import print_json
-from semidense.pipeline.results.provenance import ancestry, tree_lines
+from semidense.pipeline.results.provenance import Provenance, ancestry, tree_lines
 from semidense.pipeline.results.text import bytes_text, results
 
 
@@ -18,9 +18,12 @@ def export_archive(folder: Path | None, selection: Selection, target: Path, *, i
         CacheError: if an entry is damaged, or the file cannot be written.
     """
     store = open_store(folder)
-    keys = {entry.key for entry in selection.require(store)}
+    selected = selection.require(store)
+    keys = {entry.key for entry in selected}
     if inputs:
-        keys |= {each.entry.key for key in tuple(keys) for each in ancestry(store, key) if each.entry}
+        provenance = Provenance(store.entries())
+        behind = (each for entry in selected for each in provenance.ancestors(entry))
+        keys |= {each.entry.key for each in behind if each.entry}
     entries = export_entries(store, keys, target)
     size = sum(entry.size for entry in entries)
     if as_json:

@@ -1,21 +1,14 @@
 """The tables of figures: errors and densities, and how well the confidence ranks pixels."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from semidense.pipeline.comparison.rows import Row
-from semidense.pipeline.comparison.rows import mean_rows as comparison_means
 from semidense.pipeline.pages.html import Html, folded, table, tag, text
 from semidense.pipeline.pages.report.gathered import MASK, THRESHOLD_PX
-from semidense.pipeline.results.metric_rows import mean_rows
+from semidense.pipeline.results.metric_rows import FIGURES, mean_name, mean_rows, with_means
 
-_COLUMNS = {
-    "pixels": ("pixels", "{:,.0f}"),
-    "raw_bad": ("raw error (%)", "{:.1f}"),
-    "bad": ("error of kept (%)", "{:.1f}"),
-    "invalid": ("not kept (%)", "{:.1f}"),
-    "avgerr": ("mean error of kept (px)", "{:.2f}"),
-    "rms": ("rms of kept (px)", "{:.2f}"),
-}
+_COLUMNS = ("pixels", "raw_bad", "bad", "invalid", "avgerr", "rms")
 _NONE_CACHED = (
     "No other matcher is cached for these scenes; `pipeline compare` makes them, and they then stand here too."
 )
@@ -24,20 +17,16 @@ _NONE_CACHED = (
 def metrics_tables(rows: Sequence[Row], R: float) -> Html:
     """Return the table at the first threshold, and folded those at all thresholds and masks."""
     caption = f"Errors above {THRESHOLD_PX:g} px, mask {MASK}, R = {R:g}"
-    every = [[row["scene"], row["mask"], f"{row['threshold_px']:g}", *_cells(row)] for row in _with_mean(rows)]
-    head = [title for title, _ in _COLUMNS.values()]
+    every = [[row["scene"], row["mask"], f"{row['threshold_px']:g}", *_cells(row)] for row in with_means(rows)]
+    head = [FIGURES[name].head for name in _COLUMNS]
     more = table(["scene", "mask", "threshold (px)", *head], every, caption="All thresholds and masks", words=2)
     chosen = [row for row in rows if row["mask"] == MASK and row["threshold_px"] == THRESHOLD_PX]
-    first = [[row["scene"], *_cells(row)] for row in _with_mean(chosen)]
+    first = [[row["scene"], *_cells(row)] for row in with_means(chosen)]
     return table(["scene", *head], first, caption=caption) + folded("All thresholds and masks", more)
 
 
-def _with_mean(rows: Sequence[Row]) -> list[Row]:
-    return [*rows, *mean_rows(rows)]
-
-
-def _cells(row: Row) -> list[str]:
-    return [form.format(row[name]) if name in row else "-" for name, (_, form) in _COLUMNS.items()]
+def _cells(row: Mapping[str, Any]) -> list[str]:
+    return [FIGURES[name].text(row.get(name)) for name in _COLUMNS]
 
 
 def auc_table(compared: Sequence[Row]) -> Html:
@@ -45,7 +34,7 @@ def auc_table(compared: Sequence[Row]) -> Html:
     rows = _area_rows(compared)
     if not rows:
         return ""
-    means = comparison_means(rows)
+    means = mean_rows(rows)
     every = {(row["scene"], row["method"]): row for row in [*rows, *(means if len(means) < len(rows) else ())]}
     scenes, methods = (list(dict.fromkeys(pair[axis] for pair in every)) for axis in (0, 1))
     own, *others = methods
@@ -63,11 +52,11 @@ def auc_table(compared: Sequence[Row]) -> Html:
 
 def _areas(row: Row) -> list[str]:
     best = row["auc_optimal"]
-    return [f"{best:.4f}", _area(row), f"{row['auc'] / best:.1f}" if best else "-"]
+    return [FIGURES["auc_optimal"].text(best), _area(row), f"{row['auc'] / best:.1f}" if best else "-"]
 
 
 def _area(row: Row) -> str:
-    return f"{row['auc']:.4f}" if "auc" in row else "-"
+    return FIGURES["auc"].text(row.get("auc"))
 
 
 def _area_rows(compared: Sequence[Row]) -> list[Row]:
@@ -80,8 +69,8 @@ def _density_rows(compared: Sequence[Row]) -> list[Row]:
 
 def matcher_points(compared: Sequence[Row], scenes: int) -> list[Row]:
     """Return the mean of each other matcher that is cached for so many scenes: means over fewer do not compare."""
-    over = f"mean of {scenes}"
-    means = [row for row in comparison_means(_density_rows(compared)) if row["scene"] == over and "bad" in row]
+    over = mean_name(scenes)
+    means = [row for row in mean_rows(_density_rows(compared)) if row["scene"] == over and "bad" in row]
     return [row | {"method": f"{row['method']}, {over}"} for row in means] if scenes > 1 else means
 
 
@@ -102,14 +91,11 @@ def matchers_table(compared: Sequence[Row]) -> Html:
     rows = _density_rows(compared)
     if not rows:
         return tag("p", text(_NONE_CACHED), class_="quiet")
-    head = ["method", "scene", "not kept (%)", "error of kept (%)", "error of dual-cnn at that density (%)"]
     figures = ("invalid", "bad", "bad_dual_cnn")
+    head = ["method", "scene", *(FIGURES[name].head for name in figures)]
     means, every = (
-        [
-            [row["method"], row["scene"], *(f"{row[name]:.1f}" if name in row else "-" for name in figures)]
-            for row in part
-        ]
-        for part in (comparison_means(rows), rows)
+        [[row["method"], row["scene"], *(FIGURES[name].text(row.get(name)) for name in figures)] for row in part]
+        for part in (mean_rows(rows), rows)
     )
     caption = f"Other matchers after their own checks: errors above {THRESHOLD_PX:g} px, mask {MASK}"
     if len(means) == len(rows):  # a single scene

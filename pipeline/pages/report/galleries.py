@@ -15,8 +15,8 @@ from semidense.pipeline.pages.report.pictures import (
     photo,
 )
 from semidense.pipeline.pages.scene_maps import SceneMaps
-from semidense.pipeline.pages.tally import Tally
 from semidense.stages.evaluation.filtering import keep_confident
+from semidense.stages.metrics.tally import Tally
 
 
 def gallery(name: str, maps: SceneMaps, thresholds: tuple[float, ...]) -> Html:

@@ -6,15 +6,16 @@ from functools import cached_property
 from typing import Any
 
 from semidense.cache import Entry, Store
-from semidense.pipeline.api import METHOD, Task, open_store, status
-from semidense.pipeline.files.selection import lineage
+from semidense.pipeline.api import Task, open_store, status
 from semidense.pipeline.pages.report.baselines import cached_baselines, compared_rows
 from semidense.pipeline.pages.scene_maps import SceneMaps
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Plan, Planned
 from semidense.pipeline.plan.steps import NETS, SPLIT
+from semidense.pipeline.results.metric_rows import METHOD
+from semidense.pipeline.results.provenance import lineage
 from semidense.stages.evaluation.filtering import SemidenseParams
-from semidense.stages.metrics import metric_rows
+from semidense.stages.metrics.stage import metric_rows
 
 MASK, THRESHOLD_PX = "nonocc", 1.0
 """Mask, and error in px of the image at hand, of the tables and curves that stand first."""

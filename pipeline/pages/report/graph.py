@@ -22,7 +22,8 @@ _PLACES = {
     "descriptor_net": (1, 1),
     "evaluation_samples": (3, 1),
     "evaluation_net": (4, 1),
-    "truth": (6, 1),
+    "truth": (5, 1),
+    "ranking": (6, 1),
 }
 """Column and row of each product; a volume is made by one of the two networks that share a place."""
 _WIDTH, _HEIGHT, _GAP_X, _GAP_Y = 124, 56, 34, 54

@@ -1,5 +1,6 @@
 """How the networks learnt: their loss curves, and of shipped ones what is written in the file."""
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,6 +11,7 @@ from semidense.pipeline.pages.report.gathered import Gathered
 from semidense.pipeline.pages.report.pictures import svg
 from semidense.pipeline.plan.plan import Planned
 from semidense.pipeline.plan.shipped_weights import Weights
+from semidense.pipeline.results.opening import open_product
 from semidense.stages.weights import read_metadata
 
 
@@ -19,11 +21,11 @@ def networks(found: Gathered) -> Html:
 
 
 def _network(found: Gathered, product: str, planned: Planned) -> Html:
-    dataset = found.store.open(planned.key or "")
+    dataset = open_product(found.store, planned.key or "")
     weights = planned.step.argument
     about = read_metadata(weights.read()) if isinstance(weights, Weights) else None
     if about is not None:
-        dataset = dataset.assign_attrs(params=about.get("configuration", {}).get(product, {}))
+        dataset = dataset.assign_attrs(params=json.dumps(about.get("configuration", {}).get(product, {})))
     drawn = svg(
         figure(product, dataset, title=f"{product}: training loss"), f"Training loss of {product} over its steps"
     )

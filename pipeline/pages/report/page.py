@@ -1,7 +1,7 @@
 """The page: its parts in order, each left out where nothing is cached for it."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from importlib.resources import files
 from itertools import chain
@@ -24,11 +24,13 @@ from semidense.pipeline.pages.report.gathered import MASK, THRESHOLD_PX, Gathere
 from semidense.pipeline.pages.report.graph import graph, steps_table
 from semidense.pipeline.pages.report.networks import networks
 from semidense.pipeline.pages.report.pictures import svg
-from semidense.pipeline.pages.tally import Tally
-from semidense.pipeline.results.metric_rows import mean_rows
+from semidense.pipeline.results.metric_rows import FIGURES, averaged
+from semidense.pipeline.results.text import time_text
+from semidense.stages.metrics.tally import Tally
 
 _CURVE = tuple(percent / 100 for percent in range(0, 100, 5))
 """The thresholds R of the curve."""
+_CURVE_CAPTION = "The points of the curve, of several scenes their mean; - where a scene keeps no pixel"
 
 
 def page(found: Gathered) -> str:
@@ -72,7 +74,7 @@ def _cards(found: Gathered) -> Html:
     count = len(found.scenes)
     cards = [(str(count), "scenes with something cached" if count > 1 else f"scene: {found.scenes[0].name}")]
     if rows:
-        mean = (mean_rows(rows) or rows)[0]
+        mean = averaged(rows)[0]
         cards += [(value, about) for name, value, about in _figures(mean, found.R) if name in mean]
     return tag(
         "div",
@@ -81,7 +83,7 @@ def _cards(found: Gathered) -> Html:
     )
 
 
-def _figures(mean: dict[str, Any], R: float) -> list[tuple[str, str, str]]:
+def _figures(mean: Mapping[str, Any], R: float) -> list[tuple[str, str, str]]:
     wrong = f"more than {THRESHOLD_PX:g} px off"
     return [
         ("raw_bad", f"{mean.get('raw_bad', 0):.1f} %", f"of all pixels {wrong} before filtering"),
@@ -119,9 +121,11 @@ def _what_ran(found: Gathered) -> Html:
 
 def _note() -> Html:
     told = (
-        "Raw error counts pixels without a disparity as wrong; the errors of kept pixels are of those that the "
-        "filtered map reports. Mask nonocc: pixels that both views see; all: also those hidden in the right view; both "
-        "only where the truth is known. Thresholds are in pixels of the image at hand."
+        "raw bad: wrong pixels of the map before filtering; those without a disparity count as wrong. bad: wrong "
+        "pixels among those the filtered map keeps. invalid: pixels that it does not keep. avgerr, rms: mean and root "
+        "mean squared error of the kept pixels. A figure that one scene lacks has no mean. Mask nonocc: pixels that "
+        "both views see; all: also those hidden in the right view; both only where the truth is known. Thresholds are "
+        "in pixels of the image at hand."
     )
     return tag("p", text(told), class_="quiet")
 
@@ -132,8 +136,8 @@ def _tallies(found: Gathered) -> list[tuple[str, Tally]]:
 
 def _curves(found: Gathered) -> Html:
     rows = chain.from_iterable(tally.rows(name, threshold=THRESHOLD_PX) for name, tally in _tallies(found))
-    chosen = [row for row in rows if row["R"] in _CURVE and "bad" in row]
-    if not chosen:
+    chosen = [row for row in rows if row["R"] in _CURVE]
+    if not any("bad" in row for row in chosen):
         return ""
     drawn = error_curve_figure(
         chosen,
@@ -141,12 +145,10 @@ def _curves(found: Gathered) -> Html:
         threshold=THRESHOLD_PX,
         others=matcher_points(found.compared, len(_tallies(found))),
     )
-    rows_told = [
-        [f"{row['R']:g}", f"{row['invalid']:.1f}", f"{row['bad']:.2f}"] for row in (mean_rows(chosen) or chosen)
-    ]
-    figures = table(
-        ["R", "invalid (%)", "error of kept (%)"], rows_told, caption="The mean of the scenes, point by point"
-    )
+    names = ("invalid", "bad")
+    points = [[f"{row['R']:g}", *(FIGURES[name].text(row.get(name)) for name in names)] for row in averaged(chosen)]
+    head = ["R", *(FIGURES[name].head for name in names)]
+    figures = table(head, points, caption=_CURVE_CAPTION)
     told = svg(drawn, "Error of the kept pixels against the share of invalid ones, for each threshold R")
     return told + folded("As numbers", figures) + matchers_table(found.compared)
 
@@ -188,4 +190,4 @@ def _keys(found: Gathered) -> Html:
 
 
 def _made(found: Gathered, key: str) -> str:
-    return found.entries[key].created[:19].replace("T", " ")
+    return time_text(found.entries[key].created)

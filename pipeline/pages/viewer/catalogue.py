@@ -4,13 +4,15 @@ Read off the records alone. An entry names what it was made from by the digest o
 confidence or a disparity finds everything behind it, whatever dataset or command made it.
 """
 
-import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from semidense.cache import Entry, Store
+from semidense.cache.entries.index import Content
 from semidense.pipeline.plan.steps import SPLIT
+from semidense.pipeline.results.provenance import Provenance, single_inputs
+from semidense.pipeline.results.text import value_text
 
 _ENDS = ("confidence", "disparity")
 """Products that a configuration ends with."""
@@ -58,8 +60,7 @@ def catalogue(store: Store) -> tuple[CatalogueScene, ...]:
     Raises:
         CacheUnavailable: if the cache cannot be read.
     """
-    entries = sorted(store.entries(), key=lambda entry: entry.created)
-    records = _Records(entries)
+    records = _Records(store.entries())
     scenes: dict[tuple[str, str, str], list[Chain]] = {}
     for chain in records.chains():
         label = next(iter(chain.values())).label
@@ -80,22 +81,18 @@ def _numbered(places: Iterable[tuple[str, str, str]]) -> dict[tuple[str, str, st
 
 
 class _Records:
-    """The entries of a cache, by the digest of their content."""
+    """The chains of products that a cache holds, and the truth of each pair of images."""
 
     def __init__(self, entries: Iterable[Entry]) -> None:
-        self.entries = list(entries)
-        self.by_content = {(entry.recipe.stage, entry.digest): entry for entry in self.entries}
-        self.made_from: dict[tuple[str, str], list[Entry]] = {}
-        for entry in self.entries:
-            for place in _places(entry):
-                self.made_from.setdefault(place, []).append(entry)
-        self.truths = dict(self._truths())
+        self.provenance = Provenance(entries)
+        self._truths = dict(self._compared())
 
-    def _truths(self) -> Iterator[tuple[str, str]]:
+    def _compared(self) -> Iterator[tuple[str, str]]:
         """Yield the digests of images with those of the truth that they were compared with."""
-        for entry in self.entries:
-            for disparity, truth in _pairs(entry.recipe.inputs):
-                images = self.above({}, "disparity", disparity).get("images")
+        for entry in self.provenance.entries:
+            for digest, truth in _pairs(entry.recipe.inputs):
+                disparity = self.provenance.index.find("disparity", digest)
+                images = self.provenance.chain(disparity).get("images") if disparity else None
                 if images:
                     yield images.digest, truth
 
@@ -103,52 +100,37 @@ class _Records:
         """Yield the products behind each confidence, and behind each disparity without one, the latest first."""
         seen: set[str] = set()
         for end in _ENDS:
-            for entry in reversed([each for each in self.entries if each.recipe.stage == end]):
-                if entry.digest in seen:
-                    continue
-                chain = self.above({}, end, entry.digest)
-                seen |= {chain[product].digest for product in _ENDS if product in chain}
-                yield self._with_truth(chain)
+            for entry in reversed([each for each in self.provenance.entries if each.recipe.stage == end]):
+                if entry.digest not in seen:
+                    chain = self.provenance.chain(entry)
+                    seen |= {chain[product].digest for product in _ENDS if product in chain}
+                    yield chain | self._truth_of(chain)
 
-    def above(self, found: Chain, product: str, digest: str) -> Chain:
-        """Return a product and everything it was made from that is still there; scenes trained on are left out."""
-        entry = self.by_content.get((product, digest))
-        if entry is None or product in found:
-            return found
-        found[product] = entry
-        for name, content in entry.recipe.inputs.items():
-            if isinstance(content, str):
-                self.above(found, name, content)
-        return found
+    def _truth_of(self, chain: Chain) -> Chain:
+        """Return the truth of a chain's images, if they were compared with one that is still there."""
+        images = chain.get("images")
+        truth = self.provenance.index.find("truth", self._truths.get(images.digest, "")) if images else None
+        return {"truth": truth} if truth else {}
 
     def further(self, chain: Chain) -> tuple[Entry, ...]:
         """Return what was made from the products of a scene and from nothing else but of all training scenes."""
         known = {(product, entry.digest) for product, entry in chain.items()}
         found: dict[str, Entry] = {}
-        waiting = [place for place in known if not self._is_learnt(place)]
-        for place in waiting:
-            for entry in self.made_from.get(place, ()):
+        waiting = [content for content in known if not self._is_learnt(content)]
+        for content in waiting:
+            for entry in self.provenance.made_from(content):
                 own = (entry.recipe.stage, entry.digest)
                 if entry.recipe.stage in (*chain, *_ENDS) or entry.key in found:
                     continue
-                if all(each in known or self._is_learnt(each) for each in _places(entry)):
+                if all(each in known or self._is_learnt(each) for each in single_inputs(entry)):
                     found[entry.key] = entry
                     known.add(own)
                     waiting.append(own)
         return tuple(sorted(found.values(), key=lambda entry: entry.created))
 
-    def _is_learnt(self, place: tuple[str, str]) -> bool:
-        entry = self.by_content.get(place)
+    def _is_learnt(self, content: Content) -> bool:
+        entry = self.provenance.index.find(*content)
         return entry is not None and entry.label.get("scene") == SPLIT
-
-    def _with_truth(self, chain: Chain) -> Chain:
-        images = chain.get("images")
-        return self.above(chain, "truth", self.truths.get(images.digest, "")) if images else chain
-
-
-def _places(entry: Entry) -> list[tuple[str, str]]:
-    """Return product and digest of each single product that an entry was made from."""
-    return [(product, content) for product, content in entry.recipe.inputs.items() if isinstance(content, str)]
 
 
 def _pairs(inputs: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -180,7 +162,7 @@ def _settings(chain: Chain) -> Iterator[tuple[str, str]]:
     for product, entry in chain.items():
         for name, value in entry.recipe.params.items():
             if product not in ("images", "truth"):
-                yield f"{product}.{name}", value if isinstance(value, str) else json.dumps(value)
+                yield f"{product}.{name}", value_text(value)
 
 
 def _name(chain: Chain, differing: Mapping[str, str]) -> str:

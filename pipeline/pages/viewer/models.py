@@ -20,7 +20,7 @@ from semidense.pipeline.pages.viewer.panels import (
     scales,
     words,
 )
-from semidense.stages.metrics import MASKS, THRESHOLDS
+from semidense.stages.metrics.errors import MASKS, THRESHOLDS
 
 SWIPED = ("kept at R", "raw disparity", "error", "confidence")
 """What two configurations can be compared by."""

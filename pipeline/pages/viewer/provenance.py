@@ -1,12 +1,11 @@
 """The products behind a configuration: what made them, from what, when, and how to open them."""
 
-import json
-
 from semidense.cache import Entry, Store
+from semidense.cache.keys.recipe import short
 from semidense.pipeline.pages.html import Html, folded, table, tag, text
 from semidense.pipeline.pages.viewer.catalogue import Configuration
 from semidense.pipeline.plan.steps import place
-from semidense.pipeline.results.text import bytes_text
+from semidense.pipeline.results.text import bytes_text, opening_text, time_text, value_text
 
 
 def provenance_table(chosen: Configuration, store: Store) -> Html:
@@ -17,8 +16,8 @@ def provenance_table(chosen: Configuration, store: Store) -> Html:
             product,
             bytes_text(entry.size),
             f"{entry.seconds:.3g} s",
-            entry.created[:19].replace("T", " "),
-            entry.key[:12],
+            time_text(entry.created),
+            short(entry.key),
         ]
         for product, entry in entries
     ]
@@ -32,11 +31,11 @@ def _further(chosen: Configuration) -> Html:
     rows = [
         [
             entry.recipe.stage,
-            ", ".join(f"{name} {_short(value)}" for name, value in entry.recipe.params.items() if name != "tiles")[:80],
+            _settings(entry)[:80],
             bytes_text(entry.size),
             f"{entry.seconds:.3g} s",
-            entry.created[:19].replace("T", " "),
-            entry.key[:12],
+            time_text(entry.created),
+            short(entry.key),
         ]
         for entry in chosen.further
     ]
@@ -45,23 +44,18 @@ def _further(chosen: Configuration) -> Html:
     return folded(f"made from these: {len(rows)}", told)
 
 
+def _settings(entry: Entry) -> str:
+    return ", ".join(f"{name} {value_text(value)}" for name, value in entry.recipe.params.items() if name != "tiles")
+
+
 def _record(entry: Entry, store: Store) -> Html:
     recipe = entry.recipe
     pairs: list[tuple[str, object]] = [("key", entry.key), ("digest", entry.digest)]
-    pairs += [(f"setting {name}", _short(value)) for name, value in recipe.params.items()]
-    pairs += [(f"made from {name}", _short(value)) for name, value in recipe.inputs.items()]
+    pairs += [(f"setting {name}", value_text(value)) for name, value in recipe.params.items()]
+    pairs += [(f"made from {name}", value_text(value)) for name, value in recipe.inputs.items()]
     pairs += [(f"environment: {name}", value) for name, value in recipe.environment.items()]
     pairs += [(f"version of {name}", value) for name, value in entry.extras.get("versions", {}).items()]
     pairs += [("command", " ".join(entry.extras.get("command", []))), ("code", f"{len(recipe.code)} modules")]
-    imports = "from semidense.pipeline import open_product, open_store"
-    opening = f'{imports}; open_product(open_store("{store.root}"), "{entry.key}")'
     return table(["what", "value"], [list(pair) for pair in pairs], caption="its record", words=2) + tag(
-        "pre", text(opening)
+        "pre", text(opening_text(store.root, entry.key))
     )
-
-
-def _short(value: object) -> str:
-    """Return a value as text; of many, how many there are."""
-    if isinstance(value, list) and len(value) > 3:
-        return f"{len(value)} of them"
-    return value if isinstance(value, str) else json.dumps(value)

@@ -131,7 +131,7 @@ def table(rows: list[dict[str, Any]], capsys: pytest.CaptureFixture[str]) -> lis
 
 def test_metrics_are_a_row_a_threshold_with_dashes_for_what_does_not_apply(capsys: pytest.CaptureFixture[str]) -> None:
     lines = table([ROW | {"auc": 0.12345, "bad": 1.25, "avgerr": 0.126}], capsys)
-    assert lines[1] == ["A", "1", "0.9", "20.0", "1.2", "-", "0.13", "-", "0.1235", "-", "100"]
+    assert lines[1] == ["A", "1", "0.9", "20.00", "1.25", "-", "0.13", "-", "0.1235", "-", "100"]
     assert "mask: nonocc (exact, left-right check)" in " ".join(lines[2])
     assert len(lines) in (3, 4)
 
@@ -144,23 +144,12 @@ def test_a_row_without_a_threshold_has_none(capsys: pytest.CaptureFixture[str]) 
     assert table([{name: value for name, value in ROW.items() if name != "R"}], capsys)[1][:3] == ["A", "1", "-"]
 
 
-def test_the_mean_is_over_scenes_for_each_threshold() -> None:
-    rows = [
-        ROW,
-        ROW | {"scene": "B", "raw_bad": 30.0, "pixels": 50, "bad": 8.0},
-        ROW | {"threshold_px": 2.0, "raw_bad": 1.0},
-        ROW | {"threshold_px": 2.0, "raw_bad": 3.0, "scene": "B"},
+def test_a_sweep_shows_means_and_a_dash_for_what_a_scene_lacks(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [ROW | {"scene": scene, "R": R, "bad": 4.0} for scene in "AB" for R in (0.5, 0.9)]
+    del rows[-1]["bad"]
+    console.print_sweep(rows, {})
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert [line[:7] for line in lines[1:3]] == [
+        ["mean", "of", "2", "1", "0.5", "20.00", "4.00"],
+        ["mean", "of", "2", "1", "0.9", "20.00", "-"],
     ]
-    first, second = console.mean_rows(rows)
-    assert (first["scene"], first["raw_bad"], first["pixels"]) == ("mean of 2", 25.0, 150)
-    assert first["bad"] == 8.0, "over the scenes that have it"
-    assert (second["threshold_px"], second["raw_bad"]) == (2.0, 2.0)
-
-
-def test_a_single_scene_has_no_mean() -> None:
-    assert console.mean_rows([ROW, ROW | {"threshold_px": 2.0}]) == []
-
-
-def test_variants_are_not_mixed_in_a_mean() -> None:
-    rows = [ROW | {"scene": scene, "variant": variant} for scene in "AB" for variant in ("x", "y")]
-    assert [row["variant"] for row in console.mean_rows(rows)] == ["x", "y"]

@@ -56,7 +56,7 @@ def test_run_prints_metrics_and_what_was_reused(invoke: Invoke, there: list[str]
     ran = invoke("run", *there)
     assert ran.code == 0
     assert "raw bad %" in ran.out
-    assert ran.out.splitlines()[-1] == "reused 26 products, made nothing"
+    assert ran.out.splitlines()[-1] == "reused 27 products, made nothing"
     assert "train-0 is a training scene" in ran.err
 
 
@@ -65,7 +65,7 @@ def test_run_as_json_prints_one_object(invoke: Invoke, there: list[str], trained
     found = only_object(ran.out)
     assert ran.err == ""
     assert set(found) == {"steps", "metrics", "files"}
-    assert [list(row) for row in found["steps"]] == [STEP_KEYS] * 24
+    assert [list(row) for row in found["steps"]] == [STEP_KEYS] * 27
     assert {row["state"] for row in found["steps"]} == {"hit"}
     assert found["metrics"] == trained.metrics
     assert found["files"] == []
@@ -90,7 +90,7 @@ def test_a_plan_is_printed_and_nothing_made(invoke: Invoke, there: list[str], ho
     assert lines[-1][:3] == ["reuses", "7", "products,"]
     found = only_object(invoke(*how, *there, "--set", "channels.rank_window=15", "--json").out)
     assert set(found) == {"steps", "metrics"}
-    assert [list(row) for row in found["steps"]] == [STEP_KEYS] * 24
+    assert [list(row) for row in found["steps"]] == [STEP_KEYS] * 27
     assert {path.stat().st_mtime_ns for path in trained.store.root.rglob("*")} == before
 
 
@@ -100,7 +100,7 @@ def test_sweep_writes_a_table_and_a_curve(invoke: Invoke, own_cache: Path, tmp_p
     arguments = ["sweep", SPEC, "--train", "--config", config, "--cache", own_cache, "-o", tmp_path / "s"]
     ran = invoke(*arguments, "--R", "0,0.9")
     assert ran.code == 0
-    assert ran.out.splitlines()[-1] == "reused 26 products, made 1 semidense, 1 metrics"
+    assert ran.out.splitlines()[-1] == "reused 27 products, made 1 semidense, 1 metrics"
     assert sorted(path.name for path in (tmp_path / "s").iterdir()) == ["sweep.csv", "sweep.png"]
     found = only_object(invoke(*arguments, "--R", "0,0.9", "--json").out)
     assert {row["R"] for row in found["metrics"]} == {0, 0.9}
@@ -229,7 +229,7 @@ def test_data_list_names_datasets_and_scenes(invoke: Invoke) -> None:
 
 def test_the_environment_names_the_cache(invoke: Invoke, trained: Result, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PIPELINE_CACHE", str(trained.store.root))
-    assert invoke("run", *TRAINED).out.splitlines()[-1] == "reused 26 products, made nothing"
+    assert invoke("run", *TRAINED).out.splitlines()[-1] == "reused 27 products, made nothing"
 
 
 def test_shipped_weights_are_used_without_train(invoke: Invoke, weights: Path, tmp_path: Path) -> None:

@@ -9,11 +9,11 @@ from rich.console import Console
 
 from semidense.pipeline.comparison.ablation import ABLATION
 from semidense.pipeline.comparison.experiments import LOWERED, MATCHERS
-from semidense.pipeline.comparison.rows import OURS
 from semidense.pipeline.comparison.tables import _by_scene, _fitted
+from semidense.pipeline.results.metric_rows import METHOD
 
 SCENES = ("Motorcycle", "MotorcycleE", "Piano", "PianoL", "Pipes", "Playroom", "Shelves", "Teddy")
-METHODS = (f"{OURS}, shipped weights", *MATCHERS, LOWERED, *ABLATION)
+METHODS = (f"{METHOD}, shipped weights", *MATCHERS, LOWERED, *ABLATION)
 FEW = METHODS[:3]
 
 

@@ -9,7 +9,6 @@ from semidense.pipeline.comparison.rows import (
     curve_rows,
     density_rows,
     equal_density,
-    mean_rows,
     raw_rows,
 )
 
@@ -86,16 +85,3 @@ def test_only_the_masks_and_thresholds_that_are_wanted(judged: Judged) -> None:
     found = list(auc_rows(wanted, "any", SURE, RAW))
     assert [row["threshold_px"] for row in found] == [2.0, 1.0]
     assert all(row in every for row in found)
-
-
-def test_means_are_over_scenes_and_only_of_what_all_have() -> None:
-    same = {"experiment": "density", "method": "any", "mask": "all", "threshold_px": 1.0}
-    rows = [
-        same | {"scene": "a", "pixels": 10, "invalid": 20.0, "bad": 1.0},
-        same | {"scene": "b", "pixels": 30, "invalid": 40.0},
-        same | {"scene": "a", "pixels": 10, "invalid": 7.0, "R": 0.9},
-    ]
-    assert mean_rows(rows) == [
-        same | {"scene": "mean of 2", "pixels": 40, "invalid": 30.0},
-        same | {"scene": "mean of 1", "pixels": 10, "invalid": 7.0, "R": 0.9},
-    ]

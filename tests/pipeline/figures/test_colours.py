@@ -11,6 +11,7 @@ from semidense.pipeline.figures.colours import (
     disparity_colours,
     disparity_rgb,
     disparity_span,
+    view_rgb,
 )
 from semidense.pipeline.plan.errors import UsageError
 
@@ -89,3 +90,12 @@ def test_what_has_no_colours_is_refused(values: np.ndarray, low: float, high: fl
 )
 def test_the_span_holds_nearly_all(values: np.ndarray, expected: tuple[float, float]) -> None:
     assert disparity_span(values) == expected
+
+
+@pytest.mark.parametrize("bands", [1, 3])
+def test_a_view_of_16_bits_looks_like_the_same_view_of_8(bands: int) -> None:
+    eight = np.random.default_rng(0).integers(0, 256, (4, 5, bands), np.uint8)
+    shown = view_rgb(eight)
+    assert (shown.shape, shown.dtype) == ((4, 5, 3), np.uint8)
+    np.testing.assert_array_equal(shown, np.broadcast_to(eight, (4, 5, 3)))
+    np.testing.assert_array_equal(view_rgb(eight.astype(np.uint16) * 257), shown)

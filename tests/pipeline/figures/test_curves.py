@@ -2,14 +2,14 @@ from typing import Any
 
 import pytest
 
-from semidense.pipeline.figures.curves import error_curve_figure, mean_curve
+from semidense.pipeline.figures.curves import error_curve_figure
 from semidense.pipeline.plan.errors import UsageError
 
 
 def row(scene: str, R: float | None, invalid: float, bad: float | None, **more: object) -> dict[str, Any]:
     figures = {"R": R, "invalid": invalid, "bad": bad}
     known = {name: value for name, value in figures.items() if value is not None}
-    return {"scene": scene, "mask": "nonocc", "threshold_px": 1.0} | known | more
+    return {"scene": scene, "mask": "nonocc", "threshold_px": 1.0, "pixels": 9} | known | more
 
 
 ROWS = [
@@ -39,6 +39,10 @@ def test_a_line_a_scene_in_order_and_their_mean() -> None:
 def test_the_mean_stops_where_a_scene_reports_nothing() -> None:
     rows = [*ROWS, row("a", 0.95, 70, 0.5), row("b", 0.95, 100, None)]
     assert curves(rows)["mean of 2 scenes"] == [(5, 6), (50, 2)]
+
+
+def test_there_is_no_mean_where_a_scene_never_reports_anything() -> None:
+    assert list(curves([*ROWS, row("c", 0.1, 100, None), row("c", 0.9, 100, None)])) == ["a", "b"]
 
 
 def test_variants_are_told_apart() -> None:
@@ -72,7 +76,3 @@ def test_a_scene_is_taken_literally() -> None:
 def test_nothing_to_draw_is_refused(rows: list[dict[str, Any]]) -> None:
     with pytest.raises(UsageError, match="mask nonocc and the threshold 1 px"):
         error_curve_figure(rows)
-
-
-def test_mean_of_one_curve_is_itself() -> None:
-    assert mean_curve([{0.5: (1.0, 2.0)}]) == {0.5: (1.0, 2.0)}

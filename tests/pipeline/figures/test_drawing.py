@@ -46,16 +46,17 @@ def test_share_of_nothing_is_0() -> None:
     assert share_patch(np.zeros(0, bool), "none", "black").get_label() == "none: 0.0 %"
 
 
-def test_gray_images_of_16_bits_keep_their_scale() -> None:
-    dataset = products.images().isel(band=slice(0, 1))
-    dataset = dataset.assign(left=dataset["left"].astype(np.uint16), right=dataset["right"].astype(np.uint16))
+@pytest.mark.parametrize("bands", [1, 3])
+def test_images_of_16_bits_look_like_those_of_8(bands: int) -> None:
+    dataset = products.images().isel(band=slice(0, bands))
+    deep = dataset.assign({name: dataset[name].astype(np.uint16) * 257 for name in ("left", "right")})
     figure = new_figure("any")
-    draw_images(figure, dataset)
-    assert figure.axes[0].images[0].get_clim() == (0, 65535)
+    draw_images(figure, deep)
+    np.testing.assert_array_equal(figure.axes[0].images[0].get_array(), np.broadcast_to(dataset["left"], (4, 6, 3)))
 
 
 def test_channels_in_use_give_their_names() -> None:
-    dataset = products.channels().isel(channel=[1]).assign_attrs(params={"use": ["rank"]})
+    dataset = products.channels().isel(channel=[1]).assign_attrs(params='{"use": ["rank"]}')
     figure = new_figure("any")
     draw_channels(figure, dataset)
     assert [axes.get_title() for axes in figure.axes] == ["rank, left view (reference)", "rank, right view"]
@@ -101,7 +102,7 @@ def test_a_short_curve_has_no_mean() -> None:
 
 def test_a_ranking_loss_is_told_and_has_no_coin_s_guess() -> None:
     figure = new_figure("any")
-    draw_network(figure, products.network().assign_attrs(params={"ranking": 4.0}))
+    draw_network(figure, products.network().assign_attrs(params='{"ranking": 4.0}'))
     assert "+ 4 x ranking loss" in figure.axes[0].get_ylabel()
     assert not any("coin" in str(line.get_label()) for line in figure.axes[0].lines)
 

@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import matplotlib
@@ -87,7 +88,7 @@ def test_every_product_of_the_pipeline_has_a_figure() -> None:
             id="matches-on-the-view",
         ),
         pytest.param(
-            "metrics", ["threshold\n(px)", "raw_bad\n(%)", "rms\n(px)", "nonocc", "1,234", "n/a"], id="readable-table"
+            "metrics", ["threshold\n(px)", "raw\nbad\n%", "rms\npx", "nonocc", "1,234", "-"], id="readable-table"
         ),
     ],
 )
@@ -116,7 +117,7 @@ def test_no_state_that_callers_share_is_touched() -> None:
 @pytest.mark.parametrize(
     ("product", "chosen", "message"),
     [
-        pytest.param("semidens", {}, "did you mean semidense", id="nearest-name"),
+        pytest.param("other", {}, r"no map \(y, x\) to draw", id="another-package-s-product-without-a-map"),
         pytest.param("disparity", {"pixel": (1, 1)}, "a pixel is chosen in a costvolume", id="pixel-of-a-map"),
         pytest.param("costvolume", {"pixel": (4, 0)}, "rows 0 to 3", id="row-outside"),
         pytest.param("costvolume", {"pixel": (0, -1)}, "columns 0 to 5", id="no-counting-from-the-end"),
@@ -152,4 +153,5 @@ def test_what_cannot_be_drawn_is_refused_in_one_line(product: str, chosen: dict[
     ],
 )
 def test_a_title_says_scene_product_and_settings(attrs: dict[str, object], expected: str) -> None:
-    assert product_title(xr.Dataset(attrs=attrs)) == expected
+    texts = {name: json.dumps(value) for name, value in attrs.items()}
+    assert product_title(xr.Dataset(attrs=texts)) == expected

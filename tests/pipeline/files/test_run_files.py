@@ -13,7 +13,6 @@ from safetensors import safe_open
 
 from semidense.cache import Store
 from semidense.datasets.formats.pfm import read_pfm
-from semidense.pipeline.api import METHOD
 from semidense.pipeline.figures.colours import confidence_rgb, disparity_rgb
 from semidense.pipeline.files.run_files import COLUMNS, export, write_rows
 from semidense.pipeline.files.writing import writable_folder
@@ -22,6 +21,7 @@ from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.images_and_truth import IMAGES, TRUTH
 from semidense.pipeline.plan.plan import Made, Plan
 from semidense.pipeline.plan.steps import SPLIT, Step
+from semidense.pipeline.results.metric_rows import METHOD
 from semidense.pipeline.results.result import Result
 from semidense.stages.catalog import STAGES
 from semidense.stages.stage import Stage

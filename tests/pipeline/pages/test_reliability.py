@@ -3,7 +3,7 @@ import pytest
 from matplotlib.text import Text
 
 from semidense.pipeline.pages.reliability import reliability, reliability_figure
-from semidense.pipeline.pages.tally import Block, Tally
+from semidense.stages.metrics.tally import Block, Tally
 
 
 def tally(confidence: list[float], right: list[bool]) -> Tally:

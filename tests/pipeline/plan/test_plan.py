@@ -123,7 +123,7 @@ def test_a_damaged_record_is_a_missing_entry(toy_plan: ToyPlan, toy_run: ToyRun,
 # What depends on what, with the real stages and a whole run in the cache.
 
 ABOVE_CHANNELS = {"images", "truth", "matching_samples", "distinctiveness"}
-BELOW_DISPARITY = {"confidence", "semidense", "metrics"}
+BELOW_DISPARITY = {"confidence", "semidense", "ranking", "metrics"}
 ALL = PATH
 
 
@@ -184,6 +184,7 @@ def test_a_setting_makes_stale_exactly_what_depends_on_it(
         ),
         ("semidense.stages.evaluation.filtering", {"semidense", "metrics"}),
         ("semidense.stages.metrics.stage", {"metrics"}),
+        ("semidense.stages.metrics.confidence", {"ranking", "metrics"}),
         ("semidense.datasets.synthetic.scenes", ALL),
         ("semidense.pipeline.cli.console", set()),
         ("semidense.pipeline.execution.scheduler", set()),

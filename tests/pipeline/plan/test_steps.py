@@ -54,7 +54,7 @@ def test_with_training_the_training_scenes_are_only_learnt_from() -> None:
     made = graph(train=True)
     four = dict.fromkeys(("images", "truth", "channels", "costvolume", "disparity"), 4)
     one = dict.fromkeys(("matching_samples", "matching_net", "evaluation_samples", "evaluation_net"), 1)
-    scored = ("right_disparity", "distinctiveness", "cost_margin", "confidence", "semidense", "metrics")
+    scored = ("right_disparity", "distinctiveness", "cost_margin", "confidence", "semidense", "ranking", "metrics")
     two = dict.fromkeys(scored, 2)
     assert counts(made) == Counter({**four, **one, **two})
     assert [made.steps[each].scene for each, _ in made.targets] == ["test-0", "test-1"]

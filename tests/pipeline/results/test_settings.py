@@ -3,7 +3,7 @@ from dataclasses import dataclass
 import pytest
 
 from semidense.cache import Recipe
-from semidense.pipeline.results.settings import DEFAULTS, Belonging
+from semidense.pipeline.results.settings import DEFAULTS, Settings
 
 
 @dataclass(frozen=True)
@@ -28,4 +28,4 @@ class Made:
 )
 def test_the_settings_that_are_not_the_defaults_are_named(params: dict[str, object], text: str) -> None:
     entry = Made(Recipe("costvolume", {}, params, {}, {}))
-    assert Belonging([entry]).text(entry) == text  # type: ignore[list-item, arg-type]
+    assert Settings([entry]).text(entry) == text  # type: ignore[list-item, arg-type]

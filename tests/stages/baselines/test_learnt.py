@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from semidense.stages.baselines.declaration import CCNN, CCNN_NET, O1, O1_FOREST, CcnnParams, ForestParams
 from semidense.stages.baselines.learning import draw_pixels, labelled_scenes
 from semidense.stages.baselines.o1 import forest_confidence, o1_features
-from semidense.stages.metrics import auc
+from semidense.stages.metrics.confidence import auc
 from semidense.stages.stage import NoParams, StageError
 from tests.stages.tiling import same, tiled, whole
 

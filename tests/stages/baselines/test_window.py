@@ -1,7 +1,6 @@
 import numpy as np
-import pytest
 
-from semidense.stages.baselines.window import box_mean, keep_consistent
+from semidense.stages.baselines.window import box_mean, match_windows
 
 
 def test_a_window_is_cut_at_the_border() -> None:
@@ -11,14 +10,9 @@ def test_a_window_is_cut_at_the_border() -> None:
     np.testing.assert_array_equal(box_mean(values, 0), values)
 
 
-@pytest.mark.parametrize(
-    ("left", "right", "kept"),
-    [
-        pytest.param([0, 1, 1], [1, 0, 0], [np.nan, 1, np.nan], id="the views must agree"),
-        pytest.param([np.nan, np.nan, 2], [2, 0, 0], [np.nan, np.nan, 2], id="unknown stays unknown"),
-        pytest.param([0, 0, 0], [np.nan, 0, 0], [np.nan, 0, 0], id="no answer from the right view"),
-    ],
-)
-def test_only_what_both_views_say_is_kept(left: list[float], right: list[float], kept: list[float]) -> None:
-    found = keep_consistent(np.array([left], np.float32), np.array([right], np.float32), 0.5)
-    np.testing.assert_array_equal(found[0], np.array(kept, np.float32))
+def test_what_the_right_view_contradicts_is_dropped_never_read_from_the_other_end() -> None:
+    """Columns 0 and 1 match best at a disparity that the right view gives to others."""
+    costs = {0: np.float32([[5, 5, 5, 5]]), 1: np.float32([[1, 1, 9]])}
+    found = match_windows(lambda d, columns, seen: costs[d], (1, 4), range(2), 1, 0.5)
+    assert found["dense"].tolist() == [[0, 1, 1, 0]]
+    assert np.array_equal(found["disparity"], np.float32([[np.nan, 1, 1, 0]]), equal_nan=True)

@@ -5,6 +5,7 @@ from semidense.stages.disparity.declaration import RIGHT_DISPARITY
 from semidense.stages.disparity.right_view import agreeing, right_costs
 from semidense.stages.disparity.winner_takes_all import winner_take_all
 from semidense.stages.stage import NoParams, StageError
+from tests.stages.left_right import CASES
 from tests.stages.tiling import same, tiled, whole
 
 N = np.nan
@@ -30,19 +31,15 @@ def test_twice_seen_is_the_volume_again_where_both_views_see() -> None:
     assert np.array_equal(again[both], costs[both])
 
 
-@pytest.mark.parametrize(
-    ("left", "right", "kept"),
-    [
-        pytest.param([[N, 1, 1]], [[1, 1, N]], [[N, 1, 1]], id="confirmed"),
-        pytest.param([[N, 1, 1]], [[3, 1, N]], [[N, N, 1]], id="contradicted by 2 px"),
-        pytest.param([[N, 1, 1]], [[2, 2, N]], [[N, 1, 1]], id="1 px is tolerated"),
-        pytest.param([[2, 1, N]], [[N, N, N]], [[N, N, N]], id="outside, and the right one has none"),
-        pytest.param([[-1, -1, N]], [[N, -1, -1]], [[-1, -1, N]], id="negative disparities"),
-        pytest.param([[N, 0.6, N]], [[0.5, N, N]], [[N, 0.6, N]], id="the nearest pixel, between two"),
-    ],
-)
-def test_by_hand(left: list[list[float]], right: list[list[float]], kept: list[list[float]]) -> None:
-    assert np.array_equal(agreeing(np.float32(left), np.float32(right)), np.float32(kept), equal_nan=True)
+@pytest.mark.parametrize(("left", "right", "confirmed"), CASES)
+def test_by_hand(left: list[float], right: list[float], confirmed: list[bool]) -> None:
+    kept = np.where(confirmed, np.float32(left), np.float32(N))
+    assert np.array_equal(agreeing(np.float32([left]), np.float32([right])), [kept], equal_nan=True)
+
+
+def test_a_smaller_tolerance_keeps_less() -> None:
+    found = agreeing(np.float32([[0, 1, 1]]), np.float32([[1, 0, 0]]), 0.5)
+    assert np.array_equal(found, np.float32([[N, 1, N]]), equal_nan=True)
 
 
 def test_maps_of_different_shapes_are_refused() -> None:

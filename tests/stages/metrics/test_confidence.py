@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semidense.stages.evaluation.filtering import keep_confident
-from semidense.stages.metrics import auc, bad, error_at_density, error_curve, invalid, optimal_auc
+from semidense.stages.metrics.confidence import auc, error_at_density, optimal_auc
 from semidense.stages.stage import StageError
 
 N = np.nan
@@ -142,33 +141,6 @@ def test_error_at_density_of_nothing() -> None:
     assert np.isnan(error_at_density(np.zeros(0), np.zeros(0, bool), 0.5))
 
 
-def scene() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    rng = np.random.default_rng(2)
-    confidence = (rng.integers(0, 11, (30, 20)) / 10).astype(np.float32)
-    truth = rng.uniform(0, 50, (30, 20)).astype(np.float32)
-    disparity = truth + rng.normal(size=truth.shape).astype(np.float32)
-    disparity[:3], confidence[2:5], truth[6:8] = N, N, N
-    return confidence, disparity, truth, rng.random(truth.shape) > 0.3
-
-
-def test_the_curve_is_filtering_again_and_again() -> None:
-    confidence, disparity, truth, mask = scene()
-    Rs = [0.0, 0.9, 0.5, 0.35, 1.0]
-    curve = error_curve(confidence, disparity, truth, mask, 1.0, Rs)
-    maps = [keep_confident(disparity, confidence, R) for R in Rs]
-    assert curve.R.tolist() == Rs
-    assert curve.bad == pytest.approx([bad(kept, truth, mask, 1.0) for kept in maps], nan_ok=True)
-    assert curve.invalid == pytest.approx([invalid(kept, truth, mask) for kept in maps])
-
-
-def test_the_curve_where_nothing_is_kept_or_counts() -> None:
-    confidence, disparity, truth, mask = scene()
-    curve = error_curve(confidence * 0.5, disparity, truth, mask, 1.0, [0.8])
-    assert np.isnan(curve.bad).all() and curve.invalid.tolist() == [100]
-    empty = error_curve(confidence, disparity, truth, np.zeros_like(mask), 1.0, [0.8])
-    assert np.isnan(empty.bad).all() and np.isnan(empty.invalid).all()
-
-
 @pytest.mark.parametrize("correct", [np.array([1, 0]), np.array([True]), np.array([True, False, True])])
 def test_auc_refuses(correct: np.ndarray) -> None:
     with pytest.raises(StageError, match="expected bool, one for each of 2 pixels"):
@@ -179,18 +151,12 @@ def test_auc_refuses(correct: np.ndarray) -> None:
 
 @pytest.mark.parametrize("value", [-0.1, 1.1])
 def test_refuses_what_is_not_a_share(value: float) -> None:
-    confidence, disparity, truth, mask = scene()
     with pytest.raises(StageError, match="error rate is"):
         optimal_auc(value)
     with pytest.raises(StageError, match="density is"):
-        error_at_density(confidence, mask, value)
-    with pytest.raises(StageError, match="R is"):
-        error_curve(confidence, disparity, truth, mask, 1.0, [0.5, value])
+        error_at_density(np.zeros(2), np.array([True, False]), value)
 
 
-def test_refuses_density_zero_and_a_confidence_of_another_shape() -> None:
-    confidence, disparity, truth, mask = scene()
+def test_refuses_density_zero() -> None:
     with pytest.raises(StageError, match="density is 0"):
-        error_at_density(confidence, mask, 0)
-    with pytest.raises(StageError, match=r"confidence has shape \(29, 20\)"):
-        error_curve(confidence[1:], disparity, truth, mask, 1.0, [0.5])
+        error_at_density(np.zeros(2), np.array([True, False]), 0)

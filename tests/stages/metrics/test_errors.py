@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from semidense.stages.metrics import avgerr, bad, error_quantiles, invalid, raw_bad, rms
+from semidense.stages.metrics.errors import Errors, raw_bad
 from semidense.stages.stage import StageError
 
 N, I = np.nan, np.inf  # noqa: E741
@@ -26,20 +26,17 @@ pytestmark = pytest.mark.filterwarnings("error")
     ],
 )
 def test_bad_by_hand(threshold: float, of_reported: float, of_all: float) -> None:
-    assert bad(DISPARITY, TRUTH, MASK, threshold) == pytest.approx(of_reported)
+    assert Errors.of(DISPARITY, TRUTH, MASK).bad(threshold) == pytest.approx(of_reported)
     assert raw_bad(DISPARITY, TRUTH, MASK, threshold) == pytest.approx(of_all)
 
 
 def test_the_rest_by_hand() -> None:
-    assert invalid(DISPARITY, TRUTH, MASK) == 40
-    assert avgerr(DISPARITY, TRUTH, MASK) == 1
-    assert rms(DISPARITY, TRUTH, MASK) == pytest.approx((5 / 3) ** 0.5)
-    assert error_quantiles(DISPARITY, TRUTH, MASK) == {"A50": 1, "A90": 2, "A95": 2, "A99": 2}
+    errors = Errors.of(DISPARITY, TRUTH, MASK)
+    assert (errors.invalid(), errors.avgerr()) == (40, 1)
+    assert errors.rms() == pytest.approx((5 / 3) ** 0.5)
+    assert errors.quantiles() == {"A50": 1, "A90": 2, "A95": 2, "A99": 2}
 
 
-@pytest.mark.parametrize(
-    "measure", [avgerr, rms, invalid, lambda *maps: bad(*maps, 1), lambda *maps: raw_bad(*maps, 1)]
-)
 @pytest.mark.parametrize(
     ("truth", "mask"),
     [
@@ -48,15 +45,21 @@ def test_the_rest_by_hand() -> None:
         pytest.param(np.full_like(TRUTH, I), MASK, id="truth infinite: unknown as in a PFM file"),
     ],
 )
-def test_no_pixel_gives_nan(measure, truth: np.ndarray, mask: np.ndarray) -> None:  # noqa: ANN001
-    assert np.isnan(measure(DISPARITY, truth, mask))
+def test_no_pixel_gives_nan(truth: np.ndarray, mask: np.ndarray) -> None:
+    errors = Errors.of(DISPARITY, truth, mask)
+    found = [errors.avgerr(), errors.rms(), errors.invalid(), errors.bad(1), errors.raw_bad(1)]
+    assert np.isnan([*found, *errors.quantiles().values()]).all()
+
+
+def test_quantiles_by_hand() -> None:
+    errors = Errors.of(np.arange(1.0, 101.0), np.zeros(100), np.ones(100, bool))
+    assert errors.quantiles() == {"A50": 50, "A90": 90, "A95": 95, "A99": 99}
 
 
 def test_an_empty_map_cannot_win() -> None:
-    nothing = np.full_like(TRUTH, N)
-    assert raw_bad(nothing, TRUTH, MASK, 1) == 100 == invalid(nothing, TRUTH, MASK)
-    assert np.isnan(bad(nothing, TRUTH, MASK, 1)) and np.isnan(avgerr(nothing, TRUTH, MASK))
-    assert np.isnan(rms(nothing, TRUTH, MASK)) and all(map(np.isnan, error_quantiles(nothing, TRUTH, MASK).values()))
+    nothing = Errors.of(np.full_like(TRUTH, N), TRUTH, MASK)
+    assert nothing.raw_bad(1) == 100 == nothing.invalid()
+    assert np.isnan([nothing.bad(1), nothing.avgerr(), nothing.rms(), *nothing.quantiles().values()]).all()
 
 
 def test_float32_does_not_push_an_error_over_the_threshold() -> None:
@@ -72,15 +75,15 @@ maps = arrays(np.float32, 12, elements=st.one_of(st.just(np.float32(N)), st.floa
 @given(maps, maps, arrays(np.bool_, 12), st.sampled_from([0.5, 1.0, 2.0]))
 def test_the_measures_agree(disparity: np.ndarray, truth: np.ndarray, mask: np.ndarray, threshold: float) -> None:
     """Wrong = not reported + wrong among the reported."""
-    missing, wrong = invalid(disparity, truth, mask), bad(disparity, truth, mask, threshold)
-    dense = raw_bad(disparity, truth, mask, threshold)
+    errors = Errors.of(disparity, truth, mask)
+    missing, wrong, dense = errors.invalid(), errors.bad(threshold), errors.raw_bad(threshold)
     if np.isnan(dense):
         assert np.isnan(missing) and np.isnan(wrong)
     else:
         assert dense == pytest.approx(missing + (0 if missing == 100 else wrong * (100 - missing) / 100))
     if not np.isnan(wrong):
-        assert avgerr(disparity, truth, mask) <= rms(disparity, truth, mask) * (1 + 1e-12)
-        values = list(error_quantiles(disparity, truth, mask).values())
+        assert errors.avgerr() <= errors.rms() * (1 + 1e-12)
+        values = list(errors.quantiles().values())
         assert values == sorted(values)
 
 

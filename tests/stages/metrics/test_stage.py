@@ -4,34 +4,22 @@ import numpy as np
 import pytest
 
 from semidense.stages.evaluation.filtering import keep_confident
-from semidense.stages.metrics import (
-    MASKS,
-    METRICS,
-    THRESHOLDS,
-    auc,
-    avgerr,
-    bad,
-    error_quantiles,
-    invalid,
-    metric_rows,
-    optimal_auc,
-    raw_bad,
-    rms,
-    stage,
-)
-from semidense.stages.metrics.stage import FIGURES, by_name
-from semidense.stages.metrics.stage import compute_metrics as compute
-from semidense.stages.stage import NoParams, StageError
+from semidense.stages.metrics.confidence import auc, optimal_auc
+from semidense.stages.metrics.errors import MASKS, THRESHOLDS, Errors, raw_bad
+from semidense.stages.metrics.ranking import RANKED, RANKING
+from semidense.stages.metrics.stage import FIGURES, METRICS, by_name, metric_rows
+from semidense.stages.stage import NoParams, Stage, StageError
 from tests.stages.tiling import same
 
 N = np.nan
+Given = dict[str, dict[str, np.ndarray]]
 ROW = (
     *("scene", "method", "mask", "threshold_px", "R", "pixels"),
     *("raw_bad", "bad", "invalid", "avgerr", "rms", "auc", "auc_optimal"),
 )
 
 
-def products(R: float = 0.5) -> dict[str, dict[str, np.ndarray]]:
+def products(R: float = 0.5) -> Given:
     rng = np.random.default_rng(4)
     truth = rng.uniform(0, 60, (40, 30)).astype(np.float32)
     disparity = np.rint(truth + rng.normal(size=truth.shape) ** 3).astype(np.float32)
@@ -46,8 +34,17 @@ def products(R: float = 0.5) -> dict[str, dict[str, np.ndarray]]:
     }
 
 
-def figures(given: dict[str, dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    return by_name(METRICS.function()(NoParams(), given)["figures"])
+def ranked(given: Given) -> dict[str, np.ndarray]:
+    return dict(RANKING.function()(NoParams(), {name: given[name] for name in RANKING.inputs}))
+
+
+def made_of(given: Given) -> dict[str, np.ndarray]:
+    whole = given | {"ranking": ranked(given)}
+    return dict(METRICS.function()(NoParams(), {name: whole[name] for name in METRICS.inputs}))
+
+
+def figures(given: Given) -> dict[str, np.ndarray]:
+    return by_name(made_of(given)["figures"])
 
 
 def test_every_figure_is_that_of_its_function() -> None:
@@ -56,40 +53,49 @@ def test_every_figure_is_that_of_its_function() -> None:
     truth, semidense, disparity = (given[name]["disparity"] for name in ("truth", "semidense", "disparity"))
     for m, mask in enumerate((given["truth"]["nonocc"], np.ones(truth.shape, bool))):
         counts = mask & ~np.isnan(truth)
+        errors = Errors.of(semidense, truth, mask)
         same_at_each = {
             "pixels": counts.sum(),
-            "invalid": invalid(semidense, truth, mask),
-            "avgerr": avgerr(semidense, truth, mask),
-            "rms": rms(semidense, truth, mask),
-            **error_quantiles(semidense, truth, mask),
+            "invalid": errors.invalid(),
+            "avgerr": errors.avgerr(),
+            "rms": errors.rms(),
+            **errors.quantiles(),
         }
         for t, threshold in enumerate((0.5, 1, 2, 4)):
             correct = (np.abs(disparity - truth) <= threshold)[counts]
             raw = raw_bad(disparity, truth, mask, threshold)
             expected = same_at_each | {
                 "raw_bad": raw,
-                "bad": bad(semidense, truth, mask, threshold),
+                "bad": errors.bad(threshold),
                 "auc": auc(given["confidence"]["confidence"][counts], correct),
                 "auc_optimal": optimal_auc(raw / 100),
             }
             assert {name: made[name][m, t] for name in expected} == pytest.approx(expected)
 
 
-def test_makes_what_it_declares() -> None:
-    made = METRICS.function()(NoParams(), products())
-    assert list(made) == [output.name for output in METRICS.outputs]
-    sizes = {"figure": len(FIGURES), "mask": len(MASKS), "threshold": len(THRESHOLDS)}
-    for output in METRICS.outputs:
+@pytest.mark.parametrize(("stage", "names"), [(METRICS, FIGURES), (RANKING, RANKED)], ids=["metrics", "ranking"])
+def test_makes_what_it_declares(stage: Stage, names: tuple[str, ...]) -> None:
+    made = (made_of if stage is METRICS else ranked)(products())
+    assert list(made) == [output.name for output in stage.outputs]
+    sizes = {"figure": len(names), "mask": len(MASKS), "threshold": len(THRESHOLDS)}
+    for output in stage.outputs:
         assert made[output.name].dtype == output.dtype
         assert made[output.name].shape == tuple(sizes[dim] for dim in output.dims)
-    assert METRICS.tile_rows is None
-    assert {name: values.dtype for name, values in by_name(made["figures"]).items()} == {
-        name: dtype for name, (dtype, _, _) in FIGURES.items()
+    assert stage.tile_rows is None
+    named = by_name(made["figures"], names)
+    assert {name: str(values.dtype) for name, values in named.items()} == {
+        name: "int64" if name == "pixels" else "float64" for name in names
     }
 
 
 def test_is_deterministic() -> None:
-    assert same(METRICS.function()(NoParams(), products()), METRICS.function()(NoParams(), products()))
+    assert same(made_of(products()), made_of(products()))
+
+
+def test_ranking_does_not_depend_on_the_filter() -> None:
+    """So a sweep over R finds it in the cache."""
+    assert not {"semidense", "metrics"} & set(RANKING.inputs)
+    assert not set(RANKING.params.model_fields)
 
 
 def test_raw_error_and_area_do_not_depend_on_the_filter() -> None:
@@ -118,7 +124,7 @@ def test_when_nothing_is_reported() -> None:
 
 
 def test_rows_are_those_promised() -> None:
-    made = METRICS.function()(NoParams(), products())
+    made = made_of(products())
     rows = metric_rows("Teddy", "ours", 0.5, made)
     assert [(row["mask"], row["threshold_px"]) for row in rows] == [(m, t) for m in MASKS for t in (0.5, 1, 2, 4)]
     assert all(tuple(row) == ROW for row in rows)
@@ -131,7 +137,7 @@ def test_rows_are_those_promised() -> None:
 def test_what_does_not_apply_is_absent() -> None:
     given = products()
     given["semidense"]["disparity"] = np.full((40, 30), N, np.float32)
-    (row, *_) = metric_rows("Teddy", "sgm", None, METRICS.function()(NoParams(), given))
+    (row, *_) = metric_rows("Teddy", "sgm", None, made_of(given))
     assert set(ROW) - set(row) == {"R", "bad", "avgerr", "rms"}
 
 
@@ -144,32 +150,4 @@ def test_refuses_another_shape(product: str, array: str) -> None:
     given[product][array] = given[product][array][1:]
     name = array if array == "nonocc" else product
     with pytest.raises(StageError, match=rf"{name} has shape \(39, 30\), the ground truth \(40, 30\)"):
-        METRICS.function()(NoParams(), given)
-
-
-def test_a_sweep_ranks_the_pixels_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    ranked = []
-    plain = stage.Ranking.of
-    monkeypatch.setattr(stage, "_known", {})
-    monkeypatch.setattr(stage.Ranking, "of", lambda confidence: ranked.append(confidence) or plain(confidence))
-    made = [compute(NoParams(), products(R)) for R in (0.2, 0.5, 0.8)]
-    assert len(ranked) == len(MASKS)
-    assert not same(made[0], made[1])
-    monkeypatch.setattr(stage, "_known", {})
-    assert same(made[2], compute(NoParams(), products(0.8)))
-
-
-@pytest.mark.parametrize(
-    ("product", "name"),
-    [("disparity", "disparity"), ("confidence", "confidence"), ("truth", "disparity"), ("truth", "nonocc")],
-)
-def test_what_was_ranked_for_other_arrays_is_not_taken(
-    product: str, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    before, other = products(), products()
-    other[product][name] = np.flipud(other[product][name]).copy()
-    compute(NoParams(), before)
-    after = compute(NoParams(), other)
-    monkeypatch.setattr(stage, "_known", {})
-    assert same(after, compute(NoParams(), other))
-    assert not np.array_equal(figures(other)["auc"], figures(before)["auc"])
+        made_of(given)

@@ -41,14 +41,14 @@ def test_a_matcher_is_a_point_where_every_scene_has_it() -> None:
 
 def test_the_table_says_over_how_many_scenes_a_mean_is() -> None:
     assert cells(matchers_table(MATCHERS))[1:] == [
-        ["SGM", "mean of 2", "15.0", "8.0", "6.0"],
-        ["census", "mean of 1", "50.0", "3.0", "1.0"],
+        ["SGM", "mean of 2", "15.00", "8.00", "6.00"],
+        ["census", "mean of 1", "50.00", "3.00", "1.00"],
     ]
 
 
 def test_one_scene_needs_no_mean() -> None:
     page = matchers_table(MATCHERS[:1])
-    assert cells(page)[1:] == [["SGM", "A", "20.0", "10.0", "8.0"]]
+    assert cells(page)[1:] == [["SGM", "A", "20.00", "10.00", "8.00"]]
     assert "<details" not in page
 
 

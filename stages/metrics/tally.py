@@ -1,7 +1,7 @@
 """What every threshold R leaves of a scene's map, from one pass over its rows.
 
-A pixel *counts* where the mask is set and the truth is known, as in ``semidense.stages.metrics``. Those that count
-are sorted into bins between neighbouring thresholds; sums over the bins above a threshold are the figures at it.
+``Errors`` decides which pixels count and what their errors are, as for every other figure. The pixels are sorted into
+bins between neighbouring thresholds; sums over the bins above a threshold are the figures at it.
 """
 
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.metrics import MASKS, THRESHOLDS
+from semidense.stages.metrics.errors import MASKS, THRESHOLDS, Errors, counted, pixels_of
 
 STEPS = tuple(index / 100 for index in range(101))
 """The thresholds R: 0 to 1 in steps of 0.01."""
@@ -53,11 +53,12 @@ class Tally:
 
     @classmethod
     def of(cls, blocks: Iterable[Block], Rs: Iterable[float] = STEPS) -> "Tally":
-        """Count a scene, block by block."""
+        """Count a scene, block by block, at the thresholds ``Rs``: rising, the first 0."""
         found = cls._empty(np.array(list(Rs)))
         for block in blocks:
-            for mask, seen in enumerate((block.nonocc.astype(bool), np.True_)):
-                found._add(mask, block, np.isfinite(block.truth) & seen)
+            for mask, chosen in enumerate(pixels_of(block.nonocc.astype(bool))):
+                errors = Errors.of(block.disparity, block.truth, chosen)
+                found._add(mask, errors.absolute, block.confidence[counted(block.truth, chosen)])
         return found
 
     @classmethod
@@ -66,11 +67,9 @@ class Tally:
         shapes = ((masks,), (masks, thresholds), (masks, bins), (masks, thresholds, bins), *[(masks, bins)] * 3)
         return cls(Rs, *(np.zeros(shape) for shape in shapes))
 
-    def _add(self, mask: int, block: Block, counts: NDArray[np.bool_]) -> None:
-        error = np.abs(block.disparity[counts].astype(np.float64) - block.truth[counts])
-        sure = block.confidence[counts]
+    def _add(self, mask: int, error: Sums, sure: NDArray[Any]) -> None:
         self.pixels[mask] += error.size
-        self.raw_wrong[mask] += [np.count_nonzero(~(error <= threshold)) for threshold in THRESHOLDS]
+        self.raw_wrong[mask] += [np.count_nonzero(error > threshold) for threshold in THRESHOLDS]
         usable = np.isfinite(error) & ~np.isnan(sure)
         error, sure = error[usable], sure[usable]
         # A threshold is rounded to the confidence's type, as the filter does.

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semidense.pipeline.pages.tally import STEPS, Block, Tally
 from semidense.stages.evaluation.filtering import keep_confident
-from semidense.stages.metrics import MASKS, THRESHOLDS, avgerr, bad, invalid, raw_bad, rms
+from semidense.stages.metrics.errors import MASKS, THRESHOLDS, Errors, raw_bad
+from semidense.stages.metrics.tally import STEPS, Block, Tally
 
 N = np.nan
 
@@ -26,15 +26,15 @@ def block(seed: int, height: int = 9, width: int = 11) -> Block:
 def test_the_figures_are_those_of_the_metrics(seed: int, step: int, mask: str) -> None:
     whole = block(seed)
     chosen = whole.nonocc if mask == "nonocc" else np.ones(whole.truth.shape, bool)
-    kept = keep_confident(whole.disparity, whole.confidence, STEPS[step])
+    kept = Errors.of(keep_confident(whole.disparity, whole.confidence, STEPS[step]), whole.truth, chosen)
     tally = Tally.of([whole])
     for threshold in THRESHOLDS:
         (row,) = [row for row in tally.rows("s", mask, threshold) if row["R"] == STEPS[step]]
         expected = {
-            "invalid": invalid(kept, whole.truth, chosen),
-            "bad": bad(kept, whole.truth, chosen, threshold),
-            "avgerr": avgerr(kept, whole.truth, chosen),
-            "rms": rms(kept, whole.truth, chosen),
+            "invalid": kept.invalid(),
+            "bad": kept.bad(threshold),
+            "avgerr": kept.avgerr(),
+            "rms": kept.rms(),
         }
         assert {name: row.get(name, N) for name in expected} == pytest.approx(expected, nan_ok=True)
         assert tally.raw_bad(mask, threshold) == raw_bad(whole.disparity, whole.truth, chosen, threshold)
