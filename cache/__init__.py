@@ -28,7 +28,7 @@ from semidense.cache.errors import (
     NonDeterministicStage,
     SourceNotFound,
 )
-from semidense.cache.keys.code import code_hash, code_hash_of, code_parts, module_hash, require_imported_as_hashed
+from semidense.cache.keys.code import code_hash_of, code_parts, module_hash, require_imported_as_hashed
 from semidense.cache.keys.recipe import ABSENT, Change, Recipe, differences
 from semidense.cache.processes.lease import Lease
 from semidense.cache.processes.locks import Lock
@@ -55,7 +55,6 @@ __all__ = [
     "Recipe",
     "SourceNotFound",
     "Store",
-    "code_hash",
     "code_hash_of",
     "code_parts",
     "differences",

@@ -42,7 +42,7 @@ class Store:
         root: the folder, absolute; made on the first write.
         verify: how much of an entry is checked before it is used. ``full``: every byte, once a
             process for a file that does not change. ``size``: which files there are, and their
-            sizes. ``off``: record and manifest alone.
+            sizes.
 
     Raises:
         CacheUnavailable: if ``root`` is a URL: a cache is a folder.
@@ -53,8 +53,8 @@ class Store:
     verify: Policy
 
     def __init__(self, root: Path, verify: Policy = "full") -> None:
-        if verify not in ("full", "size", "off"):
-            raise ValueError(f"verify is {verify!r}: it must be full, size or off")
+        if verify not in ("full", "size"):
+            raise ValueError(f"verify is {verify!r}: it must be full or size")
         if _URL.fullmatch(str(root)):
             raise CacheUnavailable(
                 f"{root} is a URL, and a cache is a folder: name a folder of this machine or a share"

@@ -14,8 +14,8 @@ from semidense.cache.errors import DamagedEntry, EntryNotFound
 from semidense.cache.files import hash_file, in_threads, reading, walk
 from semidense.cache.layout import Layout
 
-Policy = Literal["full", "size", "off"]
-"""``full``: every byte. ``size``: which files there are, and their sizes. ``off``: record and manifest alone."""
+Policy = Literal["full", "size"]
+"""``full``: every byte. ``size``: which files there are, and their sizes."""
 SETTLED = 0.1
 """Seconds after which a file's times tell every later change; they advance in steps of up to 10 ms."""
 THREADS_PAY = 1 << 20
@@ -92,8 +92,7 @@ def inspect_data(layout: Layout, entry: Entry, policy: Policy, remember: bool = 
     with reading(folder):
         try:
             manifest = _read_manifest(folder, entry)
-            if policy != "off":
-                _compare_files(folder, manifest, policy, remember)
+            _compare_files(folder, manifest, policy, remember)
         except (FileNotFoundError, NotADirectoryError) as error:
             raise DamagedEntry(f"the entry {entry.key} is damaged: {error.filename} is missing") from None
         except DamagedEntry as error:

@@ -43,11 +43,6 @@ class _Module:
         return any((folder / name).is_dir() or (folder / f"{name}.py").is_file() for folder in self.folders)
 
 
-def code_hash(module: str, packages: tuple[str, ...]) -> str:
-    """Return one hash over ``code_parts``, in hexadecimal."""
-    return code_hash_of(code_parts(module, packages))
-
-
 def code_hash_of(parts: Mapping[str, str]) -> str:
     """Return one hash over the modules of a recipe, as ``code_parts`` gave them."""
     return digest(parts)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
 
-from semidense.cache.document import FORMAT_VERSION, canonical, digest, parse, plain_mapping
+from semidense.cache.document import FORMAT_VERSION, canonical, digest, plain_mapping
 from semidense.cache.errors import InvalidRecipe
 
 Inputs = Mapping[str, str | Sequence[str] | Mapping[str, str]]
@@ -32,7 +32,7 @@ class Recipe:
     Everything is kept as plain JSON types; a tuple becomes a list.
 
     >>> recipe = Recipe("rank", {"stages.rank": "1f"}, {"window": 31}, {"images": "ab"}, {})
-    >>> Recipe.from_json(recipe.to_json()) == recipe
+    >>> Recipe.from_dict(recipe.to_dict()) == recipe
     True
 
     Raises:
@@ -67,10 +67,6 @@ class Recipe:
         names = ("stage", "code", "params", "inputs", "environment", "version")
         return {name: getattr(self, name) for name in names}
 
-    def to_json(self) -> str:
-        """Return the recipe's canonical JSON."""
-        return canonical(self.to_dict())
-
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
         """Build a recipe from what ``to_dict`` gave.
@@ -85,20 +81,6 @@ class Recipe:
         if set(fields) != set(recipe.to_dict()):
             raise InvalidRecipe("not a recipe: it has no version")
         return recipe
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """Read what ``to_json`` wrote.
-
-        Raises:
-            InvalidRecipe: if it is not strict JSON, or not a recipe.
-        """
-        try:
-            return cls.from_dict(parse(text))
-        except InvalidRecipe:
-            raise
-        except ValueError as error:
-            raise InvalidRecipe(f"not a recipe: {error}") from None
 
 
 def require_texts(name: str, value: object) -> None:

@@ -36,7 +36,6 @@ class Sizes:
 
     Attributes:
         stages: bytes of the entries of each stage.
-        labels: for each name in labels, such as ``scene``: bytes of the entries of each value.
         quarantine: bytes of damaged entries that were moved aside.
         drafts: bytes of work in progress, or left by processes that are gone.
         orphans: bytes of data that have no well-formed record.
@@ -44,7 +43,6 @@ class Sizes:
     """
 
     stages: Mapping[str, int]
-    labels: Mapping[str, Mapping[str, int]]
     quarantine: int
     drafts: int
     orphans: int
@@ -107,17 +105,13 @@ def size(store: Store) -> Sizes:
         CacheUnavailable: if the file system refuses.
     """
     stages: dict[str, int] = {}
-    labels: dict[str, dict[str, int]] = {}
     recorded = set()
     for entry in store.entries():
         recorded.add(entry.key)
         stages[entry.recipe.stage] = stages.get(entry.recipe.stage, 0) + entry.size
-        for name, value in entry.label.items():
-            values = labels.setdefault(name, {})
-            values[value] = values.get(value, 0) + entry.size
     layout = store.layout
     orphans = sum(_bytes(layout.entry(key)) for key in layout.entry_keys() if key not in recorded)
-    return Sizes(stages, labels, _bytes(layout.quarantine), _bytes(layout.drafts), orphans, _bytes(layout.root))
+    return Sizes(stages, _bytes(layout.quarantine), _bytes(layout.drafts), orphans, _bytes(layout.root))
 
 
 def _bytes(path: Path) -> int:

@@ -55,7 +55,7 @@ def test_keys_are_never_paths(store: Store, key: str) -> None:
 
 
 def test_an_unknown_policy_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="full, size or off"):
+    with pytest.raises(ValueError, match="full or size"):
         Store(tmp_path, "none")  # type: ignore[arg-type]
 
 
@@ -84,7 +84,7 @@ def test_opened_data_are_lazy_labelled_and_exact(store: Store, recipe: Recipe) -
     assert {"digest", "code", "environment", "label", "created", "seconds", "extras"} < set(data.attrs)
 
 
-@pytest.mark.parametrize("policy", ["full", "size", "off"])
+@pytest.mark.parametrize("policy", ["full", "size"])
 @pytest.mark.parametrize("damage", [Path.unlink, lambda path: (path.chmod(0o600), path.write_bytes(b"x"))])
 def test_a_chunk_that_vanishes_after_opening_never_reads_as_fill(
     store: Store, make: Callable[..., Entry], recipe: Recipe, policy: Policy, damage: Callable[[Path], None]
@@ -95,13 +95,6 @@ def test_a_chunk_that_vanishes_after_opening_never_reads_as_fill(
     with pytest.raises(DamagedEntry, match="changed or vanished"):
         data["map"].values  # noqa: B018
     np.testing.assert_array_equal(data["map"][0].values, [0, 1, np.nan])
-
-
-def test_a_missing_chunk_is_an_error_even_unchecked(store: Store, make: Callable[..., Entry], recipe: Recipe) -> None:
-    make(store)
-    (store.layout.entry(recipe.key) / "data.zarr/map/c/1/0").unlink()
-    with pytest.raises(DamagedEntry, match="changed or vanished"):
-        Store(store.root, "off").open(recipe.key)["map"].values  # noqa: B018
 
 
 def test_stores_and_opened_data_travel_to_other_processes(

@@ -21,13 +21,12 @@ from semidense.stages.matching.guided.candidates import Tiles, candidates
 from semidense.stages.matching.guided.sparse import BATCH, judge_tiles
 from semidense.stages.matching.net import MatchingNet, require_views
 from semidense.stages.matching.winograd.tiles import TILE
-from semidense.stages.stage import require_shape
 
 COLUMNS = 64
 """Columns of tiles gone through at all disparities before the next: what they meet in the views stays in the cache."""
 
 
-def guided_cost_volume(
+def padded_guided_costs(
     net: MatchingNet,
     descriptor_net: DescriptorNet,
     channels: NDArray[np.float32],
@@ -35,12 +34,12 @@ def guided_cost_volume(
     votes: int,
     precision: Precision = "float32",
 ) -> NDArray[np.float32]:
-    """Return the matching costs of a whole pair in the cells that can win.
+    """Return the matching costs of a pair, or a tile of one, in the cells that can win.
 
     Args:
         net: the matching-Net, which judges.
         descriptor_net: the descriptor-Net, which proposes.
-        channels: float32 (view, channel, y, x), left view first.
+        channels: float32 (view, channel, y, x), left view first, with ``MARGIN`` px of context on every side.
         disparities: consecutive disparities, px; may be negative.
         votes: pixels that a proposal needs.
         precision: arithmetic of the convolutions.
@@ -52,21 +51,6 @@ def guided_cost_volume(
     Raises:
         StageError: if the channels do not fit the networks.
     """
-    require_shape("channels", channels, 4)
-    margin = ((0, 0), (0, 0), (MARGIN, MARGIN), (MARGIN, MARGIN))
-    padded = np.pad(channels, margin, mode="edge")
-    return padded_guided_costs(net, descriptor_net, padded, disparities, votes, precision)
-
-
-def padded_guided_costs(
-    net: MatchingNet,
-    descriptor_net: DescriptorNet,
-    channels: NDArray[np.float32],
-    disparities: range,
-    votes: int,
-    precision: Precision = "float32",
-) -> NDArray[np.float32]:
-    """As ``guided_cost_volume``, of views that bring 12 px of context on every side."""
     require_views(net, channels)
     height, width = (length - 2 * MARGIN for length in channels.shape[2:])
     proposing = padded_fast_costs(descriptor_net, channels[..., TILE:-TILE], disparities, precision)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from semidense.cache.errors import SourceNotFound
-from semidense.cache.keys.code import _locate, _parts, _read, code_hash, code_parts
+from semidense.cache.keys.code import _locate, _parts, _read, code_parts
 
 Tree = Callable[..., str]
 _numbers = itertools.count()
@@ -73,9 +73,9 @@ class Circle:
 def test_text_edits_do_not_change_the_hash(tree: Tree, old: str, new: str) -> None:
     assert old in SOURCE
     package = tree({"m.py": SOURCE})
-    before = code_hash(f"{package}.m", (package,))
+    before = code_parts(f"{package}.m", (package,))
     tree({"m.py": SOURCE.replace(old, new, 1)}, package)
-    assert code_hash(f"{package}.m", (package,)) == before
+    assert code_parts(f"{package}.m", (package,)) == before
 
 
 @pytest.mark.parametrize(
@@ -90,9 +90,9 @@ def test_text_edits_do_not_change_the_hash(tree: Tree, old: str, new: str) -> No
 )
 def test_code_edits_change_the_hash(tree: Tree, old: str, new: str) -> None:
     package = tree({"m.py": SOURCE})
-    before = code_hash(f"{package}.m", (package,))
+    before = code_parts(f"{package}.m", (package,))
     tree({"m.py": SOURCE.replace(old, new, 1)}, package)
-    assert code_hash(f"{package}.m", (package,)) != before
+    assert code_parts(f"{package}.m", (package,)) != before
 
 
 @pytest.mark.parametrize(
@@ -189,7 +189,7 @@ def test_packages_without_init_and_other_packages(tree: Tree) -> None:
 
 def test_nothing_is_imported(tree: Tree) -> None:
     package = tree({"__init__.py": "raise SystemExit", "m.py": "raise SystemExit"})
-    assert code_hash(f"{package}.m", (package,))
+    assert code_parts(f"{package}.m", (package,))
     assert package not in sys.modules
 
 
@@ -200,11 +200,11 @@ def test_the_same_source_elsewhere_has_the_same_hash(tree: Tree) -> None:
 
 def test_files_are_read_once_a_process(tree: Tree) -> None:
     package = tree({"m.py": "X = 1"})
-    before = code_hash(f"{package}.m", (package,))
+    before = code_parts(f"{package}.m", (package,))
     assert _locate(f"{package}.m") is not None
     file = Path(str(_locate(f"{package}.m").file))  # type: ignore[union-attr]
     file.write_text("X = 2", encoding="utf-8")
-    assert code_hash(f"{package}.m", (package,)) == before
+    assert code_parts(f"{package}.m", (package,)) == before
 
 
 def test_the_result_is_the_callers_own(tree: Tree) -> None:
@@ -227,7 +227,7 @@ def test_the_result_is_the_callers_own(tree: Tree) -> None:
 def test_refuses(tree: Tree, files: dict[str, str], module: str) -> None:
     package = tree(files)
     with pytest.raises(SourceNotFound, match=r"^[^\n]+$"):
-        code_hash(module.replace("PKG", package), (package,))
+        code_parts(module.replace("PKG", package), (package,))
 
 
 EDITING = """

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from semidense.cache.document import canonical, parse
 from semidense.cache.errors import InvalidRecipe
 from semidense.cache.keys.recipe import ABSENT, Change, Recipe, differences
 
@@ -26,7 +27,7 @@ def recipe(**changed: object) -> Recipe:
 def test_key_is_pinned() -> None:
     # the canonical JSON of [version, stage, code, params, inputs, environment], through sha256sum
     simple = Recipe("rank", {"m": "1f"}, {"w": 31}, {"images": "ab"}, {"torch": "2"})
-    assert simple.to_json() == (
+    assert canonical(simple.to_dict()) == (
         '{"code":{"m":"1f"},"environment":{"torch":"2"},"inputs":{"images":"ab"},'
         '"params":{"w":31},"stage":"rank","version":1}'
     )
@@ -68,7 +69,7 @@ def test_a_recipe_does_not_follow_its_arguments() -> None:
 @settings(max_examples=40, deadline=None)
 @given(recipes)
 def test_json_round_trips(made: Recipe) -> None:
-    again = Recipe.from_json(made.to_json())
+    again = Recipe.from_dict(parse(canonical(made.to_dict())))
     assert (again, again.key) == (made, made.key)
 
 
@@ -104,19 +105,16 @@ def test_refuses(changed: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    "text",
+    "fields",
     [
-        pytest.param("", id="empty"),
-        pytest.param("[]", id="not an object"),
-        pytest.param("{}", id="no fields"),
-        pytest.param(recipe().to_json().replace(',"version":1', ""), id="no version"),
-        pytest.param(recipe().to_json().replace('"version":1', '"version":1,"more":1'), id="unknown field"),
-        pytest.param(recipe().to_json().replace('"stage"', '"code"'), id="repeated field"),
+        pytest.param({}, id="no fields"),
+        pytest.param({name: value for name, value in recipe().to_dict().items() if name != "version"}, id="no version"),
+        pytest.param({**recipe().to_dict(), "more": 1}, id="unknown field"),
     ],
 )
-def test_from_json_refuses(text: str) -> None:
+def test_from_dict_refuses(fields: dict[str, Any]) -> None:
     with pytest.raises(InvalidRecipe, match="not a recipe"):
-        Recipe.from_json(text)
+        Recipe.from_dict(fields)
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,16 @@
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from semidense.stages.compute.precision import Precision
 from semidense.stages.disparity.winner_takes_all import refine_subpixel, winner_take_all
 from semidense.stages.learning.parameters import to_vector
 from semidense.stages.matching.cost_volume import cost_volume
-from semidense.stages.matching.declaration import COST_VOLUME, REACH, CostVolumeParams, Head
+from semidense.stages.matching.declaration import COST_VOLUME, MARGIN, REACH, CostVolumeParams, Head
 from semidense.stages.matching.guided import volume as module
-from semidense.stages.matching.guided.volume import guided_cost_volume
+from semidense.stages.matching.guided.volume import padded_guided_costs
 from semidense.stages.matching.winograd.tiles import TILE
 from semidense.stages.stage import StageError
 from tests.stages.matching.descriptors.test_volume import random_descriptor_net
@@ -35,6 +38,12 @@ def vectors() -> dict[str, dict[str, np.ndarray]]:
         "matching_net": {"parameters": to_vector(random_net())},
         "descriptor_net": {"parameters": to_vector(random_descriptor_net())},
     }
+
+
+def guided_cost_volume(net: Any, descriptor_net: Any, channels: NDArray[np.float32], *how: Any, **named: Any) -> Any:  # noqa: ANN401
+    """The guided volume of a whole pair, whose context is its edge."""
+    margin = [*[(0, 0)] * (channels.ndim - 2), (MARGIN, MARGIN), (MARGIN, MARGIN)]
+    return padded_guided_costs(net, descriptor_net, np.pad(channels, margin, mode="edge"), *how, **named)
 
 
 @pytest.mark.parametrize(
