@@ -21,6 +21,7 @@ from semidense.stages.matching.guided.candidates import Tiles, candidates
 from semidense.stages.matching.guided.sparse import BATCH, judge_tiles
 from semidense.stages.matching.net import MatchingNet, require_views
 from semidense.stages.matching.winograd.tiles import TILE
+from semidense.stages.stage import require_shape
 
 COLUMNS = 64
 """Columns of tiles gone through at all disparities before the next: what they meet in the views stays in the cache."""
@@ -51,6 +52,7 @@ def padded_guided_costs(
     Raises:
         StageError: if the channels do not fit the networks.
     """
+    require_shape("channels", channels, 4)
     require_views(net, channels)
     height, width = (length - 2 * MARGIN for length in channels.shape[2:])
     proposing = padded_fast_costs(descriptor_net, channels[..., TILE:-TILE], disparities, precision)
