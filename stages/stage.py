@@ -8,19 +8,53 @@ can be tested, and any stage runs in a notebook without the rest.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+T = TypeVar("T")
 Array = NDArray[Any]
 Arrays = Mapping[str, Array]
 """The arrays of one product, by name."""
 Inputs = Mapping[str, Any]
-"""What ``compute`` is given: product name -> its arrays (for a split stage: one ``Arrays`` a scene)."""
+"""What ``compute`` is given: product name -> its arrays (for a split stage: one ``Arrays`` a scene). A stage names what
+it takes by a ``TypedDict`` of the products' own, which stand beside their declarations."""
 Scope = Literal["scene", "split"]
 Border = Literal["cut", "edge"]
+
+
+class Images(TypedDict):
+    """The product ``images``: (y, x, band) uint8 or uint16; (view, moment) mean and deviation of the 8-bit gray."""
+
+    left: Array
+    right: Array
+    moments: NDArray[np.float64]
+
+
+class Truth(TypedDict):
+    """The product ``truth``: (y, x) disparities in px, NaN unknown, and what both views see; the scene's range."""
+
+    disparity: NDArray[np.float32]
+    nonocc: NDArray[np.bool_]
+    right_disparity: NDArray[np.float32]
+    right_nonocc: NDArray[np.bool_]
+    range: NDArray[np.int32]
+    mask_kind: NDArray[np.int8]
+
+
+class Network(TypedDict):
+    """A trained network: (parameter,) its weights, (step,) the loss of each training step."""
+
+    parameters: NDArray[np.float32]
+    loss: NDArray[np.float32]
+
+
+class OfImages(TypedDict):
+    """The inputs of a stage that is made from the views alone."""
+
+    images: Images
 
 
 class StageError(ValueError):
@@ -150,13 +184,12 @@ class Stage:
         return function
 
 
-def by_scene(inputs: Inputs, product: str) -> Sequence[Arrays]:
-    """Return a split stage's input as a sequence with one ``Arrays`` a training scene.
+def by_scene(scenes: Sequence[T], product: str) -> Sequence[T]:
+    """Return a split stage's input: the arrays of a product, one training scene after the other.
 
     Raises:
         StageError: if there is no training scene.
     """
-    scenes: Sequence[Arrays] = inputs[product]
     if not scenes:
         raise StageError(f"no training scene has {product!r}: name a dataset with a training split")
     return scenes

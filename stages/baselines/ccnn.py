@@ -3,21 +3,24 @@
 Source: Poggi & Mattoccia, "Learning from scratch a confidence measure", BMVC 2016.
 """
 
+from typing import TypedDict
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from semidense.stages.baselines.declaration import CCNN_RADIUS, CcnnParams
-from semidense.stages.baselines.learning import labelled_scenes
+from semidense.stages.baselines.declaration import CCNN_RADIUS, CcnnParams, Scored
+from semidense.stages.baselines.learning import OfScenes, labelled_scenes
 from semidense.stages.compute.threads import one_thread
+from semidense.stages.disparity.declaration import DisparityMap
 from semidense.stages.evaluation.net import DISPARITY_UNIT
 from semidense.stages.evaluation.samples import UNKNOWN
 from semidense.stages.learning.parameters import from_vector, initialise, to_vector
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import balanced_cross_entropy, fit
-from semidense.stages.stage import Arrays, Inputs, Monitor, NoParams, Silent
+from semidense.stages.stage import Monitor, Network, NoParams, Silent
 
 
 class Ccnn(nn.Module):
@@ -41,7 +44,7 @@ class Ccnn(nn.Module):
         return logits
 
 
-def train_ccnn(params: CcnnParams, inputs: Inputs, monitor: Monitor | None = None) -> Arrays:
+def train_ccnn(params: CcnnParams, inputs: OfScenes, monitor: Monitor | None = None) -> Network:
     """Train a CCNN from nothing on random crops of the training scenes' raw maps.
 
     Returns:
@@ -86,7 +89,14 @@ def _layer(maps: NDArray[np.float32]) -> Tensor:
     return torch.from_numpy(maps[:, None] / np.float32(DISPARITY_UNIT)).contiguous(memory_format=torch.channels_last)
 
 
-def compute_ccnn(_: NoParams, inputs: Inputs) -> Arrays:
+class OfNetwork(TypedDict):
+    """The raw map and the network that scores it."""
+
+    disparity: DisparityMap
+    ccnn_net: Network
+
+
+def compute_ccnn(_: NoParams, inputs: OfNetwork) -> Scored:
     """Compute the product ``ccnn`` of a block that brings 4 px of context on every side."""
     one_thread()
     net = Ccnn()

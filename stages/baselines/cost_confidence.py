@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.baselines.declaration import CostConfidenceParams, require_odd
+from semidense.stages.baselines.declaration import CostConfidenceParams, CostMeasures, require_odd
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.stage import Arrays, Inputs, require_shape
+from semidense.stages.matching.declaration import OfVolume
+from semidense.stages.stage import require_shape
 
 EPSILON = np.float32(1e-3)
 """Added to what is divided: a cost of 0 would make every ratio infinite, however near the rival is."""
 
 
-def cost_confidence(costs: NDArray[Any], d_min: int, window: int) -> dict[str, NDArray[np.float32]]:
+def cost_confidence(costs: NDArray[Any], d_min: int, window: int) -> CostMeasures:
     """Return four confidence measures of the disparity of least cost; higher is surer.
 
     With ``c1`` the least cost of a pixel, ``c2`` the second least, ``c2m`` the least of the other local minima (``c2``
@@ -138,7 +139,7 @@ def _average_ratio(
             apkr[y, x] = total / count
 
 
-def compute_cost_confidence(params: CostConfidenceParams, inputs: Inputs) -> Arrays:
+def compute_cost_confidence(params: CostConfidenceParams, inputs: OfVolume) -> CostMeasures:
     """Compute the product ``cost_confidence``; see ``cost_confidence``."""
     volume = inputs["costvolume"]
     return cost_confidence(volume["cost"], int(volume["d"][0]), params.window)

@@ -1,5 +1,9 @@
 """What the baselines are made from, and what can be set. Light: it loads none of the packages that they need."""
 
+from typing import TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from semidense.stages.learning.schedule import SHARDS, Schedule
@@ -101,6 +105,14 @@ CENSUS_WINDOW = (7, 9)
 NCC_WINDOW = 3
 """Side of the inner window of SNCC, as published."""
 
+
+class Matched(TypedDict):
+    """The product of a matcher: (y, x) disparities in px, NaN: none. ``disparity`` passed the matcher's own checks."""
+
+    dense: NDArray[np.float32]
+    disparity: NDArray[np.float32]
+
+
 SGM = Stage(
     product="sgm",
     inputs=("images",),
@@ -132,6 +144,16 @@ SNCC = Stage(
     halo=lambda params: NCC_WINDOW // 2 + params.window // 2,
 )
 """Summed normalised cross-correlation, winner takes all."""
+
+
+class CostMeasures(TypedDict):
+    """The product ``cost_confidence``: (y, x) each, higher is surer, NaN: none."""
+
+    apkr: NDArray[np.float32]
+    pkrn: NDArray[np.float32]
+    lrd: NDArray[np.float32]
+    msm: NDArray[np.float32]
+
 
 COST_CONFIDENCE = Stage(
     product="cost_confidence",
@@ -172,6 +194,12 @@ class CcnnParams(Schedule):
     seed: int = Field(0, ge=0, description="seed of the weights and the crops")
 
 
+class Scored(TypedDict):
+    """The product of a confidence measure: (y, x) probability that the disparity is right."""
+
+    confidence: NDArray[np.float32]
+
+
 _CONFIDENCE = Output("confidence", ("y", "x"), "float32", "1", "probability that the disparity is right, in [0, 1]")
 O1_SIDES = (5, 7, 9, 11)
 """Sides of the windows over which O1's features are taken, px."""
@@ -202,6 +230,18 @@ MC_CNN_ACCURATE = Stage(
     needs=("mccnn",),
 )
 """MC-CNN accurate with its Middlebury weights, winner takes all; as slow as an exact cost volume."""
+
+
+class Forest(TypedDict):
+    """The product ``o1_forest``: (tree,) first nodes; (node,) what is compared, children and shares."""
+
+    root: NDArray[np.int32]
+    feature: NDArray[np.int32]
+    threshold: NDArray[np.float64]
+    lower: NDArray[np.int32]
+    upper: NDArray[np.int32]
+    right: NDArray[np.float32]
+
 
 O1_FOREST = Stage(
     product="o1_forest",

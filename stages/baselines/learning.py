@@ -1,15 +1,24 @@
 """What the learnt confidence baselines learn from: pixels of the raw maps of the training scenes, right or wrong."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
+from semidense.stages.disparity.declaration import DisparityMap
 from semidense.stages.evaluation.samples import UNKNOWN, label_pixels
-from semidense.stages.stage import Inputs, StageError, by_scene
+from semidense.stages.stage import StageError, Truth, by_scene
 
 
-def labelled_scenes(inputs: Inputs, tolerance: float) -> list[tuple[NDArray[np.float32], NDArray[np.int8]]]:
+class OfScenes(TypedDict):
+    """The raw map and the truth of every training scene."""
+
+    disparity: Sequence[DisparityMap]
+    truth: Sequence[Truth]
+
+
+def labelled_scenes(inputs: OfScenes, tolerance: float) -> list[tuple[NDArray[np.float32], NDArray[np.int8]]]:
     """Return the raw map and the labels of every training scene: 1 right, 0 wrong, -1 unknown.
 
     A pixel without a disparity is unknown here: these measures look at nothing but disparities.
@@ -17,7 +26,7 @@ def labelled_scenes(inputs: Inputs, tolerance: float) -> list[tuple[NDArray[np.f
     Raises:
         StageError: if no training scene has a pixel with a known disparity and a known truth.
     """
-    pairs = zip(by_scene(inputs, "disparity"), by_scene(inputs, "truth"), strict=True)
+    pairs = zip(by_scene(inputs["disparity"], "disparity"), by_scene(inputs["truth"], "truth"), strict=True)
     scenes = []
     for raw, truth in pairs:
         labels = label_pixels(raw["disparity"], truth["disparity"], tolerance)

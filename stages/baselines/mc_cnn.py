@@ -11,11 +11,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from semidense.stages.baselines.declaration import MC_CNN_RADIUS, CheckedParams
+from semidense.stages.baselines.declaration import MC_CNN_RADIUS, CheckedParams, Matched
 from semidense.stages.baselines.window import match_windows
 from semidense.stages.compute.threads import one_thread
-from semidense.stages.stage import Arrays, Inputs
-from semidense.stages.transforms.gray import to_gray
+from semidense.stages.stage import OfImages
+from semidense.stages.transforms.gray import gray_views, to_gray
 
 _FAST, _ACCURATE = "mc_cnn_fast_mb_weights.pt", "mc_cnn_accurate_mb_weights.pt"
 
@@ -41,9 +41,9 @@ def mc_cnn_costs(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities:
     return np.ascontiguousarray(costs[..., ::-1], np.float32)
 
 
-def compute_mc_cnn(params: CheckedParams, inputs: Inputs) -> Arrays:
+def compute_mc_cnn(params: CheckedParams, inputs: OfImages) -> Matched:
     """Compute the product ``mc_cnn``: winner takes all over single costs, and its left-right check."""
-    left, right = (to_gray(inputs["images"][view]) for view in ("left", "right"))
+    left, right = gray_views(inputs["images"])
     disparities = params.disparities
     volume = mc_cnn_costs(left, right, disparities)
 
@@ -53,7 +53,7 @@ def compute_mc_cnn(params: CheckedParams, inputs: Inputs) -> Arrays:
     return match_windows(costs, left.shape, disparities, 1, params.tolerance)
 
 
-def compute_mc_cnn_accurate(params: CheckedParams, inputs: Inputs) -> Arrays:
+def compute_mc_cnn_accurate(params: CheckedParams, inputs: OfImages) -> Matched:
     """Compute a tile of the product ``mc_cnn_accurate``: as ``mc_cnn``, by the network that joins the two views."""
     from mc_cnn.model.mc_cnn_accurate import AccMcCnnInfer
 
@@ -64,8 +64,8 @@ def compute_mc_cnn_accurate(params: CheckedParams, inputs: Inputs) -> Arrays:
     images = inputs["images"]
     with torch.inference_mode():
         left, right = (
-            net.conv_blocks(_standardised(images[view], *images["moments"][index]))[0].permute(1, 2, 0)
-            for index, view in enumerate(("left", "right"))
+            net.conv_blocks(_standardised(view, *moments))[0].permute(1, 2, 0)
+            for view, moments in zip((images["left"], images["right"]), images["moments"], strict=True)
         )
 
         def costs(_: int, columns: slice, seen: slice) -> NDArray[np.float32]:

@@ -4,15 +4,16 @@ Source: Poggi & Mattoccia, "Learning a general-purpose confidence measure based 
 aggregation strategy for semi global matching", 3DV 2016.
 """
 
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.baselines.declaration import O1_SIDES, ForestParams
-from semidense.stages.baselines.learning import draw_pixels, labelled_scenes
+from semidense.stages.baselines.declaration import O1_SIDES, Forest, ForestParams, Scored
+from semidense.stages.baselines.learning import OfScenes, draw_pixels, labelled_scenes
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.stage import Arrays, Inputs, NoParams, StageError, require_shape
+from semidense.stages.disparity.declaration import DisparityMap
+from semidense.stages.stage import NoParams, StageError, require_shape
 
 FEATURES = 5 * len(O1_SIDES)
 """Five features for each window."""
@@ -81,7 +82,7 @@ def _features_of(known: NDArray[np.float32], centre: np.float32) -> NDArray[np.f
     return result
 
 
-def train_forest(params: ForestParams, inputs: Inputs) -> dict[str, NDArray[Any]]:
+def train_forest(params: ForestParams, inputs: OfScenes) -> Forest:
     """Train O1's forest on the raw maps of the training scenes; return it as flat arrays.
 
     Returns:
@@ -105,7 +106,7 @@ def train_forest(params: ForestParams, inputs: Inputs) -> dict[str, NDArray[Any]
     return _flatten([each.tree_ for each in forest.fit(features, labels).estimators_])
 
 
-def _flatten(trees: list[Any]) -> dict[str, NDArray[Any]]:
+def _flatten(trees: list[Any]) -> Forest:
     """Return scikit-learn's trees as arrays over all nodes; children are counted over all trees."""
     root = np.cumsum([0, *(tree.node_count for tree in trees[:-1])])
     shares = [tree.value[:, 0, 1] / tree.value[:, 0].sum(axis=1) for tree in trees]
@@ -124,7 +125,7 @@ def _children(trees: list[NDArray[Any]], root: NDArray[Any]) -> NDArray[np.int32
     return np.concatenate([nodes + first for nodes, first in zip(trees, root, strict=True)]).astype(np.int32)
 
 
-def forest_confidence(forest: Arrays, features: NDArray[np.float32]) -> NDArray[np.float32]:
+def forest_confidence(forest: Forest, features: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the mean over the trees of the share of right disparities at the leaf that each sample reaches.
 
     Args:
@@ -170,7 +171,14 @@ def _descend(
         result[sample] = total / len(root)
 
 
-def compute_o1(_: NoParams, inputs: Inputs) -> Arrays:
+class OfForest(TypedDict):
+    """The raw map and the forest that scores it."""
+
+    disparity: DisparityMap
+    o1_forest: Forest
+
+
+def compute_o1(_: NoParams, inputs: OfForest) -> Scored:
     """Compute the product ``o1``: NaN where there is no disparity."""
     disparity = inputs["disparity"]["disparity"]
     rows, columns = np.nonzero(np.isfinite(disparity))

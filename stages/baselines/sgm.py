@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.baselines.declaration import SgmParams
-from semidense.stages.stage import Arrays, Inputs
-from semidense.stages.transforms.gray import to_gray
+from semidense.stages.baselines.declaration import Matched, SgmParams
+from semidense.stages.stage import OfImages
+from semidense.stages.transforms.gray import gray_views
 
 _UNITS = 16
 """OpenCV's disparities are whole multiples of 1/16 px, and their number must be a multiple of 16 too."""
@@ -51,12 +51,12 @@ def match_semi_global(
     return np.where(found < disparities[0], np.float32(np.nan), found)
 
 
-def compute_sgm(params: SgmParams, inputs: Inputs) -> Arrays:
+def compute_sgm(params: SgmParams, inputs: OfImages) -> Matched:
     """Compute the product ``sgm``; see ``match_semi_global``.
 
     Source: Hirschmüller, "Stereo processing by semiglobal matching and mutual information", PAMI 2008.
     """
-    left, right = (to_gray(inputs["images"][view]) for view in ("left", "right"))
+    left, right = gray_views(inputs["images"])
     return {
         "dense": match_semi_global(left, right, params, checked=False),
         "disparity": match_semi_global(left, right, params, checked=True),

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.baselines.declaration import NCC_WINDOW, WindowParams
+from semidense.stages.baselines.declaration import NCC_WINDOW, Matched, WindowParams
 from semidense.stages.baselines.window import box_mean, match_windows
-from semidense.stages.stage import Arrays, Inputs
-from semidense.stages.transforms.gray import to_gray
+from semidense.stages.stage import OfImages
+from semidense.stages.transforms.gray import gray_views
 
 _RADIUS = NCC_WINDOW // 2
 _FLAT = np.float32(1e-3)
@@ -33,13 +33,13 @@ def _variance(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.maximum(box_mean(values * values, _RADIUS) - mean * mean, np.float32(0))
 
 
-def compute_sncc(params: WindowParams, inputs: Inputs) -> Arrays:
+def compute_sncc(params: WindowParams, inputs: OfImages) -> Matched:
     """Compute the product ``sncc``; see ``match_windows`` and ``correlation``.
 
     Source: Einecke & Eggert, "A two-stage correlation method for stereoscopic depth estimation", DICTA 2010.
     """
     # Around 0, the float32 sums of products lose less.
-    left, right = (to_gray(inputs["images"][view]).astype(np.float32) - 128 for view in ("left", "right"))
+    left, right = (view.astype(np.float32) - 128 for view in gray_views(inputs["images"]))
 
     def costs(_: int, columns: slice, seen: slice) -> NDArray[np.float32]:
         return -correlation(left[:, columns], right[:, seen])

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from semidense.stages.baselines.declaration import Matched
 from semidense.stages.compute.kernel import kernel
 from semidense.stages.disparity.right_view import agreeing
 
@@ -16,9 +17,7 @@ Planes = Callable[[int, slice, slice], NDArray[np.float32]]
 """``costs(d, left, right)``: float32 (y, column), the cost of each left column of a slice with its right column."""
 
 
-def match_windows(
-    costs: Planes, shape: tuple[int, int], disparities: range, window: int, tolerance: float
-) -> dict[str, NDArray[np.float32]]:
+def match_windows(costs: Planes, shape: tuple[int, int], disparities: range, window: int, tolerance: float) -> Matched:
     """Return the disparity of least mean cost, before and after the left-right check.
 
     Args:

@@ -1,7 +1,9 @@
 """Declare the disparity maps of both views and what follows them: refinement and filling. Loads no numba."""
 
-from typing import Literal
+from typing import Literal, TypedDict
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from semidense.stages.stage import Output, Params, Stage
@@ -14,6 +16,12 @@ class DisparityParams(Params):
         default=False,
         description="refine the disparity below a pixel, by a parabola through three costs; off in the paper",
     )
+
+
+class DisparityMap(TypedDict):
+    """A product that is a map: (y, x) disparities in px, NaN: none."""
+
+    disparity: NDArray[np.float32]
 
 
 DISPARITY = Stage(

@@ -1,12 +1,16 @@
 """What the evaluation-Net's three products are made from, and what can be set. Light: it does not load torch."""
 
-from typing import Literal
+from collections.abc import Sequence
+from typing import Literal, TypedDict
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from semidense.stages.compute.precision import Precision
+from semidense.stages.disparity.declaration import DisparityMap
 from semidense.stages.learning.schedule import SHARDS, Schedule
-from semidense.stages.stage import Output, Params, Stage
+from semidense.stages.stage import Images, Output, Params, Stage, Truth
 from semidense.stages.transforms.window import require_window
 
 PATCH = 101
@@ -92,6 +96,33 @@ class ConfidenceParams(Params):
         return ("images", "disparity", "evaluation_net", *(("distinctiveness", "cost_margin") if self.veto else ()))
 
 
+class EvaluationSamples(TypedDict):
+    """The product ``evaluation_samples``: (sample, row, column) labels and where each grid lies."""
+
+    labels: NDArray[np.int8]
+    y: NDArray[np.int32]
+    x: NDArray[np.int32]
+    scene: NDArray[np.int32]
+    mirrored: NDArray[np.bool_]
+
+
+class LabelledMaps(TypedDict):
+    """The maps of both views of every training scene, and their truth."""
+
+    disparity: Sequence[DisparityMap]
+    right_disparity: Sequence[DisparityMap]
+    truth: Sequence[Truth]
+
+
+class ScoredScenes(TypedDict):
+    """What the evaluation-Net learns from: samples, and what it sees of every training scene."""
+
+    evaluation_samples: EvaluationSamples
+    images: Sequence[Images]
+    disparity: Sequence[DisparityMap]
+    right_disparity: Sequence[DisparityMap]
+
+
 EVALUATION_SAMPLES = Stage(
     product="evaluation_samples",
     inputs=("disparity", "right_disparity", "truth"),
@@ -120,6 +151,15 @@ EVALUATION_NET = Stage(
     monitored=True,
     learnt=True,
 )
+
+
+class Confidence(TypedDict):
+    """The product ``confidence``: (y, x) each; ``network`` and ``agreement`` are what it is made of."""
+
+    confidence: NDArray[np.float32]
+    network: NDArray[np.float32]
+    agreement: NDArray[np.float32]
+
 
 CONFIDENCE = Stage(
     product="confidence",

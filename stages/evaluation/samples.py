@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.evaluation.declaration import STRIDE, EvaluationSamplesParams
-from semidense.stages.stage import Inputs, StageError, by_scene
+from semidense.stages.evaluation.declaration import STRIDE, EvaluationSamples, EvaluationSamplesParams, LabelledMaps
+from semidense.stages.stage import StageError, by_scene
 
 UNKNOWN = -1
 """Label of a pixel whose truth is not known, or that lies outside the image."""
@@ -27,7 +27,7 @@ def label_pixels(disparity: NDArray[np.float32], truth: NDArray[np.float32], tol
     return np.where(np.isfinite(truth), right, UNKNOWN).astype(np.int8)
 
 
-def draw_samples(params: EvaluationSamplesParams, inputs: Inputs) -> dict[str, NDArray[np.generic]]:
+def draw_samples(params: EvaluationSamplesParams, inputs: LabelledMaps) -> EvaluationSamples:
     """Draw the samples of all training scenes, in random order.
 
     Returns:
@@ -62,11 +62,11 @@ class _Map:
     labels: NDArray[np.int8]
 
 
-def _maps(params: EvaluationSamplesParams, inputs: Inputs) -> list[_Map]:
+def _maps(params: EvaluationSamplesParams, inputs: LabelledMaps) -> list[_Map]:
     """Return the left view's map of each scene, and the right view's, mirrored, if its truth is known."""
-    products = (by_scene(inputs, product) for product in ("disparity", "right_disparity", "truth"))
+    scenes = by_scene(inputs["disparity"], "disparity"), inputs["right_disparity"], inputs["truth"]
     found = []
-    for scene, (left, right, truth) in enumerate(zip(*products, strict=True)):
+    for scene, (left, right, truth) in enumerate(zip(*scenes, strict=True)):
         found.append(_Map(scene, False, label_pixels(left["disparity"], truth["disparity"], params.tolerance)))
         if params.mirror and np.isfinite(truth["right_disparity"]).any():
             labels = label_pixels(right["disparity"], truth["right_disparity"], params.tolerance)

@@ -8,22 +8,28 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from semidense.stages.compute.precision import autocast
-from semidense.stages.evaluation.declaration import PATCH, RADIUS, STRIDE, EvaluationNetParams
+from semidense.stages.disparity.declaration import DisparityMap
+from semidense.stages.evaluation.declaration import (
+    PATCH,
+    RADIUS,
+    STRIDE,
+    EvaluationNetParams,
+    EvaluationSamples,
+    ScoredScenes,
+)
 from semidense.stages.evaluation.layers import evaluation_layers
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.augmentation import relight
 from semidense.stages.learning.parameters import initialise, to_vector
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import balanced_cross_entropy, fit
-from semidense.stages.stage import Arrays, Inputs, Monitor, Silent, by_scene
+from semidense.stages.stage import Images, Monitor, Network, Silent, by_scene
 
 Sides = tuple[NDArray[np.float32], NDArray[np.float32]]
 """The layers (layer, y, x) of the left view and its map, and of the right view and its map, mirrored."""
 
 
-def train_evaluation_net(
-    params: EvaluationNetParams, inputs: Inputs, monitor: Monitor | None = None
-) -> dict[str, NDArray[np.float32]]:
+def train_evaluation_net(params: EvaluationNetParams, inputs: ScoredScenes, monitor: Monitor | None = None) -> Network:
     """Train an evaluation-Net from nothing.
 
     Args:
@@ -34,7 +40,7 @@ def train_evaluation_net(
     Returns:
         ``parameters`` float32 (parameter,) and ``loss`` float32 (step,).
     """
-    products = (by_scene(inputs, product) for product in ("images", "disparity", "right_disparity"))
+    products = by_scene(inputs["images"], "images"), inputs["disparity"], inputs["right_disparity"]
     scenes = [_sides(*scene) for scene in zip(*products, strict=True)]
     net = EvaluationNet().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     initialise(net, params.seed)
@@ -68,7 +74,7 @@ def _undo_the_balance(net: EvaluationNet, labels: NDArray[np.int8]) -> None:
             net.out.bias[1] += np.log(right / wrong)
 
 
-def _sides(images: Arrays, left: Arrays, right: Arrays) -> Sides:
+def _sides(images: Images, left: DisparityMap, right: DisparityMap) -> Sides:
     """Return the layers of one scene, upright and mirrored."""
     upright = evaluation_layers(images["left"], images["moments"][0], left["disparity"])
     mirrored = evaluation_layers(images["right"], images["moments"][1], right["disparity"])[:, :, ::-1]
@@ -77,7 +83,7 @@ def _sides(images: Arrays, left: Arrays, right: Arrays) -> Sides:
 
 def cut_crop(
     params: EvaluationNetParams,
-    samples: Arrays,
+    samples: EvaluationSamples,
     index: int,
     scenes: Sequence[Sides],
     rng: np.random.Generator,

@@ -1,7 +1,9 @@
 """What the products up to the cost volume are made from, and what can be set. Light: it does not load torch."""
 
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypedDict
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from semidense.stages.compute.precision import Precision
@@ -196,6 +198,20 @@ DESCRIPTOR_NET = Stage(
     monitored=True,
     learnt=True,
 )
+
+
+class CostVolume(TypedDict):
+    """The product ``costvolume``: (y, x, d) log-odds of a mismatch, NaN: no such cell; (d,) its disparities in px."""
+
+    cost: NDArray[np.float16]
+    d: NDArray[np.int16]
+
+
+class OfVolume(TypedDict):
+    """The inputs of a stage that is made from the costs alone."""
+
+    costvolume: CostVolume
+
 
 COST_VOLUME = Stage(
     product="costvolume",

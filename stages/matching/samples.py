@@ -51,7 +51,7 @@ def draw_samples(params: MatchingSamplesParams, inputs: Inputs) -> dict[str, NDA
         StageError: if a crop does not fit into a scene, or a scene has no pixel to learn from.
     """
     rng = np.random.default_rng(params.seed)
-    scenes = [_Scene(truth, params) for truth in by_scene(inputs, "truth")]
+    scenes = [_Scene(truth, params) for truth in by_scene(inputs["truth"], "truth")]
     order = rng.permutation(np.arange(params.samples) % len(scenes))
     drawn = [_draw(scenes[scene], rng) for scene in order]
     columns = {name: np.stack([sample[name] for sample in drawn]) for name in drawn[0]}

@@ -40,7 +40,7 @@ def train_matching_net(
     Returns:
         ``parameters`` float32 (parameter,) and ``loss`` float32 (step,).
     """
-    scenes = [scene["channels"] for scene in by_scene(inputs, "channels")]
+    scenes = [scene["channels"] for scene in by_scene(inputs["channels"], "channels")]
     net = MatchingNet(scenes[0].shape[1], params.head).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     initialise(net, params.seed)
     measure_channels(net, scenes)

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.stage import Array, Arrays, Inputs, StageError
+from semidense.stages.stage import OfImages, StageError
 from semidense.stages.transforms.companion import companion
-from semidense.stages.transforms.declaration import ChannelsParams
+from semidense.stages.transforms.declaration import Channels, ChannelsParams
 from semidense.stages.transforms.gray import gray_moments, to_gray
 from semidense.stages.transforms.rank import rank
 
@@ -66,7 +66,7 @@ def _levels(params: ChannelsParams, mean: float, std: float) -> NDArray[np.float
     return value.astype(np.float32)
 
 
-def compute_channels(params: ChannelsParams, inputs: Inputs) -> Arrays:
+def compute_channels(params: ChannelsParams, inputs: OfImages) -> Channels:
     """Compute the product ``channels`` of an image or of a block of it; see ``channels``."""
-    images: dict[str, Array] = inputs["images"]
+    images = inputs["images"]
     return {"channels": channels(images["left"], images["right"], params, images["moments"])}

@@ -1,7 +1,9 @@
 """What the channels are made from, and what can be set. Light: it does not load numba."""
 
-from typing import Literal
+from typing import Literal, TypedDict
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from semidense.stages.stage import Output, Params, Stage
@@ -47,6 +49,12 @@ class ChannelsParams(Params):
         """Pixels that a channel in use looks away from its own."""
         windows = {"gray": 1, "rank": self.rank_window, "companion": self.companion_window}
         return max(windows[channel] for channel in self.use) // 2
+
+
+class Channels(TypedDict):
+    """The product ``channels``: (view, channel, y, x)."""
+
+    channels: NDArray[np.float32]
 
 
 CHANNELS = Stage(

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.stage import StageError
+from semidense.stages.stage import Images, StageError
 
 LUMA = (299, 587, 114)
 """ITU-R BT.601 weights of red, green and blue, in thousandths."""
@@ -93,3 +93,8 @@ def _require_image(image: NDArray[Any]) -> None:
         raise StageError(f"image has shape {image.shape}, expected (y, x), (y, x, 1) or (y, x, 3)")
     if image.size == 0:
         raise StageError(f"image has shape {image.shape}: there is no pixel")
+
+
+def gray_views(images: Images) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return both views of the product ``images`` as 8-bit gray (y, x)."""
+    return to_gray(images["left"]), to_gray(images["right"])

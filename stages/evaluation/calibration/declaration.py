@@ -1,5 +1,9 @@
 """What the calibration of the confidence is made from, and what can be set. Light: it loads nothing heavy."""
 
+from typing import TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from semidense.stages.stage import Output, Params, Stage
@@ -27,6 +31,16 @@ class CalibrationParams(Params):
     )
 
 
+class Calibration(TypedDict):
+    """The product ``calibration``: counts of right and wrong pixels by confidence, and the map that fits them best."""
+
+    right: NDArray[np.int64]
+    wrong: NDArray[np.int64]
+    score: NDArray[np.float64]
+    log_odds: NDArray[np.float64]
+    tolerance: NDArray[np.float64]
+
+
 CALIBRATION = Stage(
     product="calibration",
     inputs=("confidence", "disparity", "truth"),
@@ -46,6 +60,13 @@ CALIBRATION = Stage(
 """How often a pixel of a confidence is right, in training scenes whose raw map and confidence come from networks that
 have not seen them (cross-fitting). ``disparity`` and ``confidence`` are one a scene, made by the networks of its
 fold."""
+
+
+class Calibrated(TypedDict):
+    """The product ``calibrated_confidence``: (y, x) probability."""
+
+    confidence: NDArray[np.float32]
+
 
 CALIBRATED_CONFIDENCE = Stage(
     product="calibrated_confidence",

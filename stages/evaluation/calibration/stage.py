@@ -1,20 +1,41 @@
 """What a confidence is worth: how often pixels of that confidence are right in scenes that no network has seen."""
 
+from collections.abc import Sequence
+from typing import TypedDict
+
 import numpy as np
 
-from semidense.stages.evaluation.calibration.declaration import MAPS, CalibrationParams
+from semidense.stages.disparity.declaration import DisparityMap
+from semidense.stages.evaluation.calibration.declaration import MAPS, Calibrated, Calibration, CalibrationParams
 from semidense.stages.evaluation.calibration.maps import FITS, calibrate, cross_validate
 from semidense.stages.evaluation.calibration.table import Table, tally
-from semidense.stages.stage import Arrays, Inputs, NoParams, StageError, by_scene
+from semidense.stages.evaluation.declaration import Confidence
+from semidense.stages.stage import NoParams, StageError, Truth, by_scene
 
 
-def compute_calibration(params: CalibrationParams, inputs: Inputs) -> Arrays:
+class ScoredMaps(TypedDict):
+    """The confidence, the raw map and the truth of every training scene."""
+
+    confidence: Sequence[Confidence]
+    disparity: Sequence[DisparityMap]
+    truth: Sequence[Truth]
+
+
+class Uncalibrated(TypedDict):
+    """A confidence and what it is worth."""
+
+    confidence: Confidence
+    calibration: Calibration
+
+
+def compute_calibration(params: CalibrationParams, inputs: ScoredMaps) -> Calibration:
     """Compute the product ``calibration``; of the maps, that of the lowest score on scenes it was not fitted to.
 
     Raises:
         StageError: if there is not one fold for each scene.
     """
-    scenes = zip(*(by_scene(inputs, name) for name in ("confidence", "disparity", "truth")), strict=True)
+    scores_of = by_scene(inputs["confidence"], "confidence")
+    scenes = zip(scores_of, inputs["disparity"], inputs["truth"], strict=True)
     counts = [
         tally(confidence["confidence"], disparity["disparity"], truth["disparity"], params.tolerance)
         for confidence, disparity, truth in scenes
@@ -33,6 +54,6 @@ def compute_calibration(params: CalibrationParams, inputs: Inputs) -> Arrays:
     }
 
 
-def compute_calibrated_confidence(_: NoParams, inputs: Inputs) -> Arrays:
+def compute_calibrated_confidence(_: NoParams, inputs: Uncalibrated) -> Calibrated:
     """Compute the product ``calibrated_confidence``; see ``calibrate``."""
     return {"confidence": calibrate(inputs["confidence"]["confidence"], inputs["calibration"]["log_odds"])}

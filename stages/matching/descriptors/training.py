@@ -37,7 +37,7 @@ def train_descriptor_net(
     Returns:
         ``parameters`` float32 (parameter,) and ``loss`` float32 (step,).
     """
-    scenes = [scene["channels"] for scene in by_scene(inputs, "channels")]
+    scenes = [scene["channels"] for scene in by_scene(inputs["channels"], "channels")]
     net = DescriptorNet(scenes[0].shape[1]).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     initialise(net, params.seed)
     measure_channels(net, scenes)
