@@ -51,10 +51,29 @@ class Network(TypedDict):
     loss: NDArray[np.float32]
 
 
+class CostVolume(TypedDict):
+    """The product ``costvolume``: (y, x, d) log-odds of a mismatch, NaN: no such cell; (d,) its disparities in px."""
+
+    cost: NDArray[np.float16]
+    d: NDArray[np.int16]
+
+
+class DisparityMap(TypedDict):
+    """A product that is a map: (y, x) disparities in px, NaN: none."""
+
+    disparity: NDArray[np.float32]
+
+
 class OfImages(TypedDict):
     """The inputs of a stage that is made from the views alone."""
 
     images: Images
+
+
+class OfVolume(TypedDict):
+    """The inputs of a stage that is made from the costs alone."""
+
+    costvolume: CostVolume
 
 
 class StageError(ValueError):

@@ -14,13 +14,12 @@ from torch.nn import functional
 from semidense.stages.baselines.declaration import CCNN_RADIUS, CcnnParams, Scored
 from semidense.stages.baselines.learning import OfScenes, labelled_scenes
 from semidense.stages.compute.threads import one_thread
-from semidense.stages.disparity.declaration import DisparityMap
 from semidense.stages.evaluation.net import DISPARITY_UNIT
 from semidense.stages.evaluation.samples import UNKNOWN
 from semidense.stages.learning.parameters import from_vector, initialise, to_vector
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import balanced_cross_entropy, fit
-from semidense.stages.stage import Monitor, Network, NoParams, Silent
+from semidense.stages.stage import DisparityMap, Monitor, Network, NoParams, Silent
 
 
 class Ccnn(nn.Module):

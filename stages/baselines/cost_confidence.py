@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from semidense.stages.baselines.declaration import CostConfidenceParams, CostMeasures, require_odd
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.matching.declaration import OfVolume
-from semidense.stages.stage import require_shape
+from semidense.stages.stage import OfVolume, require_shape
 
 EPSILON = np.float32(1e-3)
 """Added to what is divided: a cost of 0 would make every ratio infinite, however near the rival is."""

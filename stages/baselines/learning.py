@@ -6,9 +6,8 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.disparity.declaration import DisparityMap
 from semidense.stages.evaluation.samples import UNKNOWN, label_pixels
-from semidense.stages.stage import StageError, Truth, by_scene
+from semidense.stages.stage import DisparityMap, StageError, Truth, by_scene
 
 
 class OfScenes(TypedDict):

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from semidense.stages.baselines.declaration import O1_SIDES, Forest, ForestParams, Scored
 from semidense.stages.baselines.learning import OfScenes, draw_pixels, labelled_scenes
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.disparity.declaration import DisparityMap
-from semidense.stages.stage import NoParams, StageError, require_shape
+from semidense.stages.stage import DisparityMap, NoParams, StageError, require_shape
 
 FEATURES = 5 * len(O1_SIDES)
 """Five features for each window."""

@@ -1,12 +1,12 @@
 """Declare the disparity maps of both views and what follows them: refinement and filling. Loads no numba."""
 
-from typing import Literal, TypedDict
+from typing import Literal, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from semidense.stages.stage import Output, Params, Stage
+from semidense.stages.stage import CostVolume, DisparityMap, Output, Params, Stage
 
 
 class DisparityParams(Params):
@@ -16,12 +16,6 @@ class DisparityParams(Params):
         default=False,
         description="refine the disparity below a pixel, by a parabola through three costs; off in the paper",
     )
-
-
-class DisparityMap(TypedDict):
-    """A product that is a map: (y, x) disparities in px, NaN: none."""
-
-    disparity: NDArray[np.float32]
 
 
 DISPARITY = Stage(
@@ -118,6 +112,15 @@ RIGHT_AGGREGATED = Stage(
 )
 """The same of the right view, from the same volume; ``use.right_disparity=right_aggregated``."""
 
+
+class OfFiltered(TypedDict):
+    """What a map is refined with; of the last two only those that the settings need are there."""
+
+    semidense: DisparityMap
+    right_disparity: NotRequired[DisparityMap]
+    costvolume: NotRequired[CostVolume]
+
+
 REFINED = Stage(
     product="refined",
     inputs=("semidense", "right_disparity", "costvolume"),
@@ -128,6 +131,20 @@ REFINED = Stage(
 )
 """The filtered map after the steps that were asked for; with none of them, the filtered map itself. Only those inputs
 are made that the settings need."""
+
+
+class OfRefined(TypedDict):
+    """The map whose holes are filled."""
+
+    refined: DisparityMap
+
+
+class Filled(TypedDict):
+    """The product ``filled``: (y, x) disparities in px, and which of them are guesses."""
+
+    disparity: NDArray[np.float32]
+    guessed: NDArray[np.bool_]
+
 
 FILLED = Stage(
     product="filled",

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.stage import Arrays, Inputs, NoParams, require_shape
+from semidense.stages.disparity.declaration import Filled, OfRefined
+from semidense.stages.stage import NoParams, require_shape
 
 
 def fill_holes(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -45,7 +46,7 @@ def _carried(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(last < 0, np.float32(np.nan), carried)
 
 
-def compute_filled(_: NoParams, inputs: Inputs) -> Arrays:
+def compute_filled(_: NoParams, inputs: OfRefined) -> Filled:
     """Compute the product ``filled``; see ``fill_holes``."""
     disparity = inputs["refined"]["disparity"]
     filled = fill_holes(disparity)

@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from semidense.stages.disparity.declaration import RefinedParams
+from semidense.stages.disparity.declaration import OfFiltered, RefinedParams
 from semidense.stages.disparity.right_view import agreeing
 from semidense.stages.disparity.winner_takes_all import refine_subpixel
-from semidense.stages.stage import Array, Arrays, Inputs
+from semidense.stages.stage import DisparityMap
 
 
-def compute_refined(params: RefinedParams, inputs: Inputs) -> Arrays:
+def compute_refined(params: RefinedParams, inputs: OfFiltered) -> DisparityMap:
     """Compute the product ``refined``; see ``agreeing`` and ``refine_subpixel``.
 
     Disparities that are no whole numbers were refined before the filter (``disparity.subpixel``) and stay.
     """
-    disparity: Array = inputs["semidense"]["disparity"]
+    disparity = inputs["semidense"]["disparity"]
     if params.left_right:
         disparity = agreeing(disparity, inputs["right_disparity"]["disparity"], params.tolerance)
     if params.subpixel:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.disparity.winner_takes_all import winner_take_all
-from semidense.stages.stage import Array, Arrays, Inputs, NoParams, StageError, require_shape
+from semidense.stages.stage import DisparityMap, NoParams, OfVolume, StageError, require_shape
 
 
 def right_costs(costs: NDArray[Any], d_min: int) -> NDArray[Any]:
@@ -67,8 +67,8 @@ def agreeing(disparity: NDArray[np.float32], right: NDArray[np.float32], toleran
     return kept
 
 
-def compute_right_disparity(_: NoParams, inputs: Inputs) -> Arrays:
+def compute_right_disparity(_: NoParams, inputs: OfVolume) -> DisparityMap:
     """Compute the product ``right_disparity``: winner takes all in ``right_costs``."""
-    costs: Array = inputs["costvolume"]["cost"]
+    costs = inputs["costvolume"]["cost"]
     d_min = int(inputs["costvolume"]["d"][0])
     return {"disparity": winner_take_all(right_costs(costs, d_min), d_min)}

@@ -7,11 +7,12 @@ is the other's best, no other place along the row is nearly as good, and its nei
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.stage import Array, Arrays, Inputs, NoParams, Output, Stage
+from semidense.stages.stage import Array, NoParams, OfImages, Output, Stage
 from semidense.stages.transforms.gray import to_gray
 
 LONGEST = 480
@@ -170,7 +171,18 @@ def _agreed(good: NDArray[np.bool_], disparity: NDArray[np.intp], row: NDArray[n
     return support >= _AGREEING
 
 
-def compute_survey(_: NoParams, inputs: Inputs) -> Arrays:
+class Surveyed(TypedDict):
+    """The product ``survey``: see ``Survey``, and the shrunken views (y, x)."""
+
+    matches: NDArray[np.float32]
+    range: NDArray[np.float32]
+    equal: NDArray[np.float32]
+    step: NDArray[np.int32]
+    left: NDArray[np.uint8]
+    right: NDArray[np.uint8]
+
+
+def compute_survey(_: NoParams, inputs: OfImages) -> Surveyed:
     """Compute the product ``survey``; see ``survey``."""
     images = inputs["images"]
     left, right = to_gray(images["left"]), to_gray(images["right"])

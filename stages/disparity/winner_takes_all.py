@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
 from semidense.stages.disparity.declaration import DisparityParams
-from semidense.stages.stage import Array, Arrays, Inputs, StageError, require_shape
+from semidense.stages.stage import Array, DisparityMap, OfVolume, StageError, require_shape
 
 NONE = np.int16(np.iinfo(np.int16).max)
 """The rank of an invalid cost: above every number's, infinity included."""
@@ -137,14 +137,14 @@ def _order(bits: np.uint16) -> np.int16:
     return np.int16(-size) if bits & 0x8000 else size
 
 
-def compute_disparity(params: DisparityParams, inputs: Inputs) -> Arrays:
+def compute_disparity(params: DisparityParams, inputs: OfVolume) -> DisparityMap:
     """Compute the product ``disparity``; see ``winner_take_all`` and ``refine_subpixel``.
 
     Raises:
         StageError: if the volume and its coordinate ``d`` do not fit together.
     """
-    costs: Array = inputs["costvolume"]["cost"]
-    range_: Array = inputs["costvolume"]["d"]
+    costs = inputs["costvolume"]["cost"]
+    range_ = inputs["costvolume"]["d"]
     if costs.ndim != 3 or range_.shape != costs.shape[2:]:
         raise StageError(f"the cost volume has shape {costs.shape}, its coordinate d {range_.shape}: they must agree")
     d_min = int(range_[0]) if range_.size else 0

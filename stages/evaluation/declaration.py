@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from semidense.stages.compute.precision import Precision
-from semidense.stages.disparity.declaration import DisparityMap
 from semidense.stages.learning.schedule import SHARDS, Schedule
-from semidense.stages.stage import Images, Output, Params, Stage, Truth
+from semidense.stages.stage import DisparityMap, Images, Output, Params, Stage, Truth
 from semidense.stages.transforms.window import require_window
 
 PATCH = 101

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from semidense.stages.compute.precision import autocast
-from semidense.stages.disparity.declaration import DisparityMap
 from semidense.stages.evaluation.declaration import (
     PATCH,
     RADIUS,
@@ -23,7 +22,7 @@ from semidense.stages.learning.augmentation import relight
 from semidense.stages.learning.parameters import initialise, to_vector
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import balanced_cross_entropy, fit
-from semidense.stages.stage import Images, Monitor, Network, Silent, by_scene
+from semidense.stages.stage import DisparityMap, Images, Monitor, Network, Silent, by_scene
 
 Sides = tuple[NDArray[np.float32], NDArray[np.float32]]
 """The layers (layer, y, x) of the left view and its map, and of the right view and its map, mirrored."""

@@ -17,14 +17,14 @@ from torch.nn import functional
 from semidense.stages.compute.allocator import keep_freed_memory
 from semidense.stages.compute.precision import Precision, autocast, dtype_of
 from semidense.stages.compute.threads import one_thread
-from semidense.stages.matching.declaration import RADIUS, CostVolumeParams
+from semidense.stages.matching.declaration import RADIUS, CostVolumeParams, OfNetworks
 from semidense.stages.matching.descriptors.net import descriptor_net_from_parameters
 from semidense.stages.matching.descriptors.volume import padded_fast_costs
 from semidense.stages.matching.guided.volume import padded_guided_costs
 from semidense.stages.matching.net import SIDES, MatchingNet, net_from_parameters, require_views
 from semidense.stages.matching.winograd.tiles import TILE
 from semidense.stages.matching.winograd.volume import TransformedNet, is_transformable, run_blocks
-from semidense.stages.stage import Inputs, require_shape
+from semidense.stages.stage import CostVolume, require_shape
 
 ROWS, COLUMNS = 32, 64
 """Cells computed at once: few enough for all that is in between to stay in the processor's cache."""
@@ -135,12 +135,12 @@ def _transformed(net: MatchingNet, views: Tensor, precision: Precision) -> Costs
     return costs
 
 
-def compute_costs(params: CostVolumeParams, inputs: Inputs) -> dict[str, NDArray[np.generic]]:
+def compute_costs(params: CostVolumeParams, inputs: OfNetworks) -> CostVolume:
     """Return one tile of the volume: ``cost`` float16 (y, x, d) and its coordinate ``d`` int16."""
     return {"cost": _costs(params, inputs).astype(np.float16), "d": np.array(params.disparities, np.int16)}
 
 
-def _costs(params: CostVolumeParams, inputs: Inputs) -> NDArray[np.float32]:
+def _costs(params: CostVolumeParams, inputs: OfNetworks) -> NDArray[np.float32]:
     channels, disparities, precision = inputs["channels"]["channels"], params.disparities, params.precision
     if params.mode == "exact":
         net = net_from_parameters(inputs["matching_net"]["parameters"], channels.shape[1])

@@ -16,9 +16,8 @@ from torch import Tensor
 
 from semidense.stages.learning.augmentation import relight
 from semidense.stages.learning.training import balanced_cross_entropy
-from semidense.stages.matching.declaration import RADIUS
+from semidense.stages.matching.declaration import RADIUS, MatchingSamples
 from semidense.stages.matching.samples import ABSENT
-from semidense.stages.stage import Arrays
 
 IGNORED = -1
 
@@ -49,7 +48,7 @@ class Crop:
 
 
 def cut_crop(
-    samples: Arrays,
+    samples: MatchingSamples,
     index: int,
     scenes: Sequence[NDArray[np.float32]],
     strength: float,

@@ -1,6 +1,7 @@
 """What the products up to the cost volume are made from, and what can be set. Light: it does not load torch."""
 
-from typing import Any, ClassVar, Literal, TypedDict
+from collections.abc import Sequence
+from typing import Any, ClassVar, Literal, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,8 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, mod
 
 from semidense.stages.compute.precision import Precision
 from semidense.stages.learning.schedule import SHARDS, Schedule
-from semidense.stages.stage import Output, Params, Stage, StageError
+from semidense.stages.stage import Network, Output, Params, Stage, StageError, Truth
+from semidense.stages.transforms.declaration import Channels
 
 Form = Literal["dense", "patch"]
 Head = Literal["compact", "paper"]
@@ -153,6 +155,39 @@ _NETS = {
 _WITHOUT = {"exact": ("mode", "votes"), "guided": (), "fast": ("votes",)}
 """The settings that a volume of each mode does not depend on."""
 
+
+class MatchingSamples(TypedDict):
+    """The product ``matching_samples``: where each crop lies, its disparities (sample, slot) and its truth."""
+
+    scene: NDArray[np.int32]
+    mirrored: NDArray[np.bool_]
+    y: NDArray[np.int32]
+    x: NDArray[np.int32]
+    disparities: NDArray[np.int32]
+    truth: NDArray[np.float32]
+
+
+class OfTruths(TypedDict):
+    """The truth of every training scene."""
+
+    truth: Sequence[Truth]
+
+
+class OfSamples(TypedDict):
+    """What the networks of the costs learn from: samples, and the channels of every training scene."""
+
+    matching_samples: MatchingSamples
+    channels: Sequence[Channels]
+
+
+class OfNetworks(TypedDict):
+    """What a cost volume is made from; of the networks only those that its mode takes are there."""
+
+    channels: Channels
+    matching_net: NotRequired[Network]
+    descriptor_net: NotRequired[Network]
+
+
 MATCHING_SAMPLES = Stage(
     product="matching_samples",
     inputs=("truth",),
@@ -198,19 +233,6 @@ DESCRIPTOR_NET = Stage(
     monitored=True,
     learnt=True,
 )
-
-
-class CostVolume(TypedDict):
-    """The product ``costvolume``: (y, x, d) log-odds of a mismatch, NaN: no such cell; (d,) its disparities in px."""
-
-    cost: NDArray[np.float16]
-    d: NDArray[np.int16]
-
-
-class OfVolume(TypedDict):
-    """The inputs of a stage that is made from the costs alone."""
-
-    costvolume: CostVolume
 
 
 COST_VOLUME = Stage(

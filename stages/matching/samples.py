@@ -16,12 +16,13 @@ exchanged, which is again a rectified pair.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.matching.declaration import MatchingSamplesParams
-from semidense.stages.stage import Arrays, Inputs, StageError, by_scene
+from semidense.stages.matching.declaration import MatchingSamples, MatchingSamplesParams, OfTruths
+from semidense.stages.stage import StageError, Truth, by_scene
 
 NEAR = 6
 """Largest distance from the truth, in pixels, of a mismatch that is drawn beside it."""
@@ -29,7 +30,7 @@ ABSENT = np.iinfo(np.int32).min
 """Fills the slots of a sample that has fewer disparities than the others."""
 
 
-def visible_truth(truth: Arrays, mirrored: bool) -> NDArray[np.float32]:
+def visible_truth(truth: Truth, mirrored: bool) -> NDArray[np.float32]:
     """Return the disparity of the pixels seen in both views, NaN elsewhere: float32 (y, x).
 
     Mirrored, it is that of the right view, flipped: the left view of the mirrored pair.
@@ -39,7 +40,7 @@ def visible_truth(truth: Arrays, mirrored: bool) -> NDArray[np.float32]:
     return np.where(truth["nonocc"], truth["disparity"], np.float32(np.nan))
 
 
-def draw_samples(params: MatchingSamplesParams, inputs: Inputs) -> dict[str, NDArray[np.generic]]:
+def draw_samples(params: MatchingSamplesParams, inputs: OfTruths) -> MatchingSamples:
     """Draw the samples of all training scenes, in random order.
 
     Returns:
@@ -54,8 +55,14 @@ def draw_samples(params: MatchingSamplesParams, inputs: Inputs) -> dict[str, NDA
     scenes = [_Scene(truth, params) for truth in by_scene(inputs["truth"], "truth")]
     order = rng.permutation(np.arange(params.samples) % len(scenes))
     drawn = [_draw(scenes[scene], rng) for scene in order]
-    columns = {name: np.stack([sample[name] for sample in drawn]) for name in drawn[0]}
-    return {"scene": order.astype(np.int32), **columns}
+    return {
+        "scene": order.astype(np.int32),
+        "mirrored": np.array([sample.mirrored for sample in drawn]),
+        "y": np.array([sample.y for sample in drawn], np.int32),
+        "x": np.array([sample.x for sample in drawn], np.int32),
+        "disparities": np.stack([sample.disparities for sample in drawn]),
+        "truth": np.stack([sample.truth for sample in drawn]),
+    }
 
 
 @dataclass(frozen=True)
@@ -91,7 +98,7 @@ class _Side:
 class _Scene:
     """A training scene, upright and, where samples may be mirrored, mirrored."""
 
-    truth: Arrays
+    truth: Truth
     params: MatchingSamplesParams
 
     @cached_property
@@ -110,7 +117,17 @@ class _Scene:
         return self.upright if self.mirrored is None or rng.random() >= 0.5 else self.mirrored
 
 
-def _draw(scene: _Scene, rng: np.random.Generator) -> dict[str, NDArray[np.generic]]:
+class _Drawn(NamedTuple):
+    """One sample; see ``MatchingSamples``."""
+
+    mirrored: bool
+    y: int
+    x: int
+    disparities: NDArray[np.int32]
+    truth: NDArray[np.float32]
+
+
+def _draw(scene: _Scene, rng: np.random.Generator) -> _Drawn:
     """Draw one sample of one scene, around a pixel whose truth is known."""
     params = scene.params
     side = scene.side(rng)
@@ -120,13 +137,8 @@ def _draw(scene: _Scene, rng: np.random.Generator) -> dict[str, NDArray[np.gener
     low, high = (int(bound) for bound in scene.truth["range"])
     pick = _patch_slots if params.form == "patch" else _dense_slots
     slots = pick(known, low, high, params.disparities, rng)
-    return {
-        "mirrored": np.array(side is scene.mirrored),
-        "y": np.array(y, np.int32),
-        "x": np.array(x, np.int32),
-        "disparities": slots.astype(np.int32),
-        "truth": np.ascontiguousarray(crop, np.float32),
-    }
+    truth = np.ascontiguousarray(crop, np.float32)
+    return _Drawn(side is scene.mirrored, y, x, slots.astype(np.int32), truth)
 
 
 def _patch_slots(

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
@@ -18,17 +17,15 @@ from semidense.stages.learning.parameters import initialise, to_vector
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import fit
 from semidense.stages.matching.crops import Crop, cells_loss, cut_crop, measure_channels
-from semidense.stages.matching.declaration import MatchingNetParams
+from semidense.stages.matching.declaration import MatchingNetParams, OfSamples
 from semidense.stages.matching.net import SIDES, MatchingNet
 from semidense.stages.matching.winograd.tiles import TILE
 from semidense.stages.matching.winograd.training import joined_units
 from semidense.stages.matching.winograd.volume import TransformedNet, is_transformable
-from semidense.stages.stage import Inputs, Monitor, Silent, by_scene
+from semidense.stages.stage import Monitor, Network, Silent, by_scene
 
 
-def train_matching_net(
-    params: MatchingNetParams, inputs: Inputs, monitor: Monitor | None = None
-) -> dict[str, NDArray[np.float32]]:
+def train_matching_net(params: MatchingNetParams, inputs: OfSamples, monitor: Monitor | None = None) -> Network:
     """Train a matching-Net from nothing.
 
     Args:

@@ -1,6 +1,8 @@
 import inspect
 import subprocess
 import sys
+from collections.abc import Sequence
+from typing import get_args, get_origin, get_type_hints
 
 import pytest
 
@@ -52,3 +54,23 @@ def test_declarations_load_neither_torch_nor_numba() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@stages
+def test_the_types_say_what_the_declaration_says(stage: Stage) -> None:
+    """What a type checker sees of a stage's arrays, in and out, is what its declaration promises."""
+    hints = get_type_hints(stage.function(), include_extras=True)
+    assert set(get_type_hints(hints["inputs"])) == set(stage.inputs)
+    if stage.compute.startswith("semidense."):
+        assert list(get_type_hints(hints["return"])) and set(get_type_hints(hints["return"])) == {
+            output.name for output in stage.outputs
+        }
+
+
+@stages
+def test_the_inputs_are_typed_as_their_own_stages_make_them(stage: Stage) -> None:
+    hints = get_type_hints(get_type_hints(stage.function())["inputs"])
+    for product, kind in hints.items():
+        arrays = get_type_hints(get_args(kind)[0] if get_origin(kind) is Sequence else kind)
+        made = {output.name for output in STAGES[product].outputs} if product in STAGES else set(arrays)
+        assert set(arrays) <= made, product

@@ -5,12 +5,11 @@ from typing import TypedDict
 
 import numpy as np
 
-from semidense.stages.disparity.declaration import DisparityMap
 from semidense.stages.evaluation.calibration.declaration import MAPS, Calibrated, Calibration, CalibrationParams
 from semidense.stages.evaluation.calibration.maps import FITS, calibrate, cross_validate
 from semidense.stages.evaluation.calibration.table import Table, tally
 from semidense.stages.evaluation.declaration import Confidence
-from semidense.stages.stage import NoParams, StageError, Truth, by_scene
+from semidense.stages.stage import DisparityMap, NoParams, StageError, Truth, by_scene
 
 
 class ScoredMaps(TypedDict):

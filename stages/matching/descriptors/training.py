@@ -15,18 +15,16 @@ from semidense.stages.learning.parameters import initialise, to_vector
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import fit
 from semidense.stages.matching.crops import Crop, cells_loss, cut_crop, measure_channels
-from semidense.stages.matching.declaration import REACH, DescriptorNetParams
+from semidense.stages.matching.declaration import REACH, DescriptorNetParams, MatchingSamples, OfSamples
 from semidense.stages.matching.descriptors.net import DescriptorNet
 from semidense.stages.matching.descriptors.transformed import kernels_of, transformed_descriptors
 from semidense.stages.matching.descriptors.transformed_training import differentiable
 from semidense.stages.matching.descriptors.volume import diagonals
 from semidense.stages.matching.samples import ABSENT
-from semidense.stages.stage import Arrays, Inputs, Monitor, Silent, by_scene
+from semidense.stages.stage import Monitor, Network, Silent, by_scene
 
 
-def train_descriptor_net(
-    params: DescriptorNetParams, inputs: Inputs, monitor: Monitor | None = None
-) -> dict[str, NDArray[np.float32]]:
+def train_descriptor_net(params: DescriptorNetParams, inputs: OfSamples, monitor: Monitor | None = None) -> Network:
     """Train a descriptor-Net from nothing.
 
     Args:
@@ -77,7 +75,7 @@ def _logits(net: DescriptorNet, kernels: Sequence[Tensor] | None, crop: Crop) ->
     return torch.stack([torch.zeros_like(mismatch), mismatch], 1)
 
 
-def _range(samples: Arrays, scene: int) -> NDArray[np.int32]:
+def _range(samples: MatchingSamples, scene: int) -> NDArray[np.int32]:
     """Return all disparities from the smallest to the largest that a scene's samples have."""
     known = samples["disparities"][samples["scene"] == scene]
     known = known[known != ABSENT]
