@@ -34,7 +34,6 @@ class Edition:
         views: Folders of the left and of the right view, in the order in which they are looked for.
         truth: Folder of the truth of all pixels, and of those visible in both views.
         calibration: Folder of the calibrations.
-        cameras: Folder whose name tells `kitti_cameras` which cameras each entry of ``views`` is of.
         disparities: The range to search; None for that of the scene's truth.
         split: Whether a scene with a truth may be trained on.
     """
@@ -43,7 +42,6 @@ class Edition:
     views: tuple[tuple[str, str], ...]
     truth: tuple[str, str]
     calibration: str
-    cameras: tuple[str, ...]
     disparities: DisparityRange | None
     split: Split
 
@@ -71,8 +69,7 @@ def scenes(edition: Edition, argument: str) -> tuple[SceneSource, ...]:
         )
     roles = _folders(edition, folder, place)
     _check_counterparts(roles, names)
-    calibrations = folder / edition.calibration, edition.cameras[place]
-    return tuple(_source(edition, roles, calibrations, name) for name in names)
+    return tuple(_source(edition, roles, folder / edition.calibration, name) for name in names)
 
 
 def read_images(files: Mapping[str, Path], parameters: Mapping[str, Parameter]) -> tuple[ImageArray, ImageArray]:
@@ -112,10 +109,10 @@ def _check_counterparts(roles: Mapping[str, Path], names: list[str]) -> None:
             )
 
 
-def _source(edition: Edition, roles: Mapping[str, Path], calibrations: tuple[Path, str], name: str) -> SceneSource:
+def _source(edition: Edition, roles: Mapping[str, Path], calibrations: Path, name: str) -> SceneSource:
     files = {role: folder / name for role, folder in roles.items()}
     size = image_size(files["left"])
-    known = _calibration(name, size, *calibrations)
+    known = _calibration(name, size, calibrations, roles["left"].name)
     return SceneSource(
         name=Path(name).stem,
         dataset=edition.name,
@@ -130,9 +127,9 @@ def _source(edition: Edition, roles: Mapping[str, Path], calibrations: tuple[Pat
     )
 
 
-def _calibration(name: str, size: tuple[int, int], folder: Path, cameras: str) -> PairCalibration | None:
+def _calibration(name: str, size: tuple[int, int], folder: Path, left: str) -> PairCalibration | None:
     path = folder / f"{name.partition('_')[0]}.txt"
-    return read_cameras([path], folder=cameras).fitted(name, size) if path.is_file() else None
+    return read_cameras([path], folder=left).fitted(name, size) if path.is_file() else None
 
 
 def _range_of_truth(files: Mapping[str, Path]) -> DisparityRange:

@@ -22,7 +22,6 @@ EDITION = Edition(
     views=(("image_0", "image_1"), ("colored_0", "colored_1")),
     truth=("disp_occ", "disp_noc"),
     calibration="calib",
-    cameras=("image_0", "image_2"),
     disparities=None,
     split="train",
 )

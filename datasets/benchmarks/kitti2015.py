@@ -22,7 +22,6 @@ EDITION = Edition(
     views=(("image_2", "image_3"),),
     truth=("disp_occ_0", "disp_noc_0"),
     calibration="calib_cam_to_cam",
-    cameras=("image_2",),
     disparities=DISPARITIES,
     split="test",
 )

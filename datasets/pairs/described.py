@@ -92,9 +92,8 @@ def _entries(path: Path) -> dict[str, Any]:
         if name not in _ENTRIES:
             raise DatasetError(f"{path}: {name} is not known; known are {', '.join(_ENTRIES)}")
         if not isinstance(value, _ENTRIES[name]) or isinstance(value, bool):
-            raise DatasetError(
-                f"{path}: {name} = {value!r}; expected {'text' if str in _ENTRIES[name] else 'a number'}"
-            )
+            expected = "text" if str in _ENTRIES[name] else "a number"
+            raise DatasetError(f"{path}: {name} = {value!r}; expected {expected}")
     _check(path, entries)
     return entries
 
