@@ -92,7 +92,7 @@ CALIBRATIONS: dict[str, Made] = {
     ),
     "Karlsruhe": (karlsruhe, None, 30, (480, 640)),
     "`K.txt`": (lambda folder: text(folder / "K.txt", f"{K}\n0.12\n"), None, 0, None),
-    "JSON": (own_json, None, 30, None),
+    "JSON, YAML": (own_json, None, 30, None),
     "stereo sensor": (sensor, None, 0, (480, 640)),
 }
 
