@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from semidense.datasets import Calibration, ImageError, open_dataset
+from semidense.datasets import Calibration, DatasetError, ImageError, open_dataset
 from semidense.datasets.formats.calibration.reading import read_cameras
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own-pictures.md").read_text()
@@ -112,6 +112,22 @@ def test_a_calibration(tmp_path: Path, row: str) -> None:
     assert replace(known, baseline=120, doffs=doffs) == Calibration(500, 120, doffs, (311, 250))
     assert (known.baseline, known.doffs) == pytest.approx((120, doffs))
     assert (found.size, found.warnings) == (size, ())
+
+
+@pytest.mark.parametrize("row", CALIBRATIONS)
+def test_a_garbled_calibration_is_read_or_refused_in_one_line(tmp_path: Path, row: str) -> None:
+    make, unit, *_ = CALIBRATIONS[row]
+    files = make(tmp_path)
+    whole, random = [file.read_bytes() for file in files], np.random.default_rng(1)
+    for _ in range(60):
+        for file, content in zip(files, whole, strict=True):
+            place, length = int(random.integers(len(content))), int(random.integers(4))
+            put = random.choice([b"nan", b"1e400", b"-", b"[", b"null", b"{", b"", b"\xff", b"true", b"\n"])
+            file.write_bytes(content[:place] + bytes(put) + content[place + length :])
+        try:
+            read_cameras(files, unit)
+        except DatasetError as refused:
+            assert "\n" not in str(refused)
 
 
 PAIRS = {
