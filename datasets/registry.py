@@ -4,7 +4,7 @@ import difflib
 import re
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -101,7 +101,8 @@ _KINDS = (
         "Middlebury MiddEval3, 2014, 2001, 2003, 2005 or 2006: a scene, a collection or a root of several",
         f"{_HERE}.benchmarks.middlebury",
     ),
-    Kind("kitti2015:DIR", "KITTI Stereo 2015: its root or its training folder", f"{_HERE}.benchmarks.kitti"),
+    Kind("kitti2012:DIR", "KITTI Stereo 2012: its root or its training folder", f"{_HERE}.benchmarks.kitti2012"),
+    Kind("kitti2015:DIR", "KITTI Stereo 2015: its root or its training folder", f"{_HERE}.benchmarks.kitti2015"),
     Kind("eth3d:DIR", "ETH3D two-view: a scene, two_view_training or its parent", f"{_HERE}.benchmarks.eth3d"),
     Kind(
         "synthetic[:KEY=VALUE,...]",
@@ -113,6 +114,7 @@ _KINDS = (
         "your own: two files, folders or patterns, or pair:LIST.csv; see `match`",
         f"{_HERE}.pairs.pair",
     ),
+    Kind("toml:FILE", "a data set of your own that a small TOML file describes", f"{_HERE}.pairs.described"),
 )
 GROUP = "semidense.datasets"
 """Entry points of this group name the `Kind` of a dataset that another package reads."""
@@ -156,14 +158,17 @@ def open_dataset(spec: str) -> Dataset:
 
     Args:
         spec: such as ``motorcycle``, ``middlebury:DIR`` or ``pair:LEFT,RIGHT[,KEY=VALUE,...]``; `describe` lists all.
-            A folder alone is taken for the benchmark whose layout it has.
+            A folder alone is taken for the benchmark whose layout it has. Several are joined by ``+``; where they share
+            a scene's name, the kind of data set is put before it.
 
     Raises:
         UnknownDatasetError: If the name before the colon is not known; the nearest one is given.
         DatasetError: If the folder does not follow the layout, or a file in it is not valid.
     """
-    name, _, argument = spec.partition(":")
     known = kinds()
+    if len(parts := re.split(rf"\+(?=(?:{'|'.join(map(re.escape, known))})(?:[:+]|$))", spec)) > 1:
+        return _joined(spec, [open_dataset(part) for part in parts])
+    name, _, argument = spec.partition(":")
     if name not in known and spec and Path(spec).is_dir():
         return open_dataset(folder_spec(Path(spec)))
     if name not in known:
@@ -172,6 +177,16 @@ def open_dataset(spec: str) -> Dataset:
         raise UnknownDatasetError(f"no data set {name!r}; {hint}")
     lister = cast(_Lister, import_module(known[name].module))
     return Dataset(spec, lister.list_scenes(argument))
+
+
+def _joined(spec: str, parts: list[Dataset]) -> Dataset:
+    count = Counter(scene.name for part in parts for scene in part.scenes)
+    named = [
+        replace(scene, name=f"{part.spec.partition(':')[0]}/{scene.name}") if count[scene.name] > 1 else scene
+        for part in parts
+        for scene in part.scenes
+    ]
+    return Dataset(spec, tuple(named))
 
 
 def folder_spec(folder: Path) -> str:
@@ -184,6 +199,8 @@ def folder_spec(folder: Path) -> str:
     around = set(folder.absolute().parts)
     if "image_2" in inside:
         return f"kitti2015:{folder}"
+    if inside & {"image_0", "colored_0"}:
+        return f"kitti2012:{folder}"
     return f"eth3d:{folder}" if "two_view_training" in inside | around else f"middlebury:{folder}"
 
 

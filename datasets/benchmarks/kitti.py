@@ -1,19 +1,13 @@
-"""Find the scenes of KITTI Stereo 2015: driving, with a sparse truth from a laser scanner.
+"""Read what KITTI's two stereo benchmarks share: driving, with a sparse truth from a laser scanner.
 
-``kitti2015:DIR`` takes the root or its ``training`` (or ``testing``) folder::
-
-    DIR/training/image_2/000000_10.png      left view
-    DIR/training/image_3/000000_10.png      right view
-    DIR/training/disp_noc_0/000000_10.png   truth of the pixels visible in both views, 16-bit PNG
-    DIR/training/disp_occ_0/000000_10.png   truth of all pixels (optional)
-
-Files belong together by name; ``_11`` frames are of the flow benchmark and left alone. With ``disp_occ_0`` the truth is
-that, and the mask is where ``disp_noc_0`` has one; without it the truth is ``disp_noc_0`` and the mask is all of it.
-
-Source: Menze & Geiger, "Object Scene Flow for Autonomous Vehicles", CVPR 2015.
+Files of one frame have one name in every folder; ``_11`` frames are of the flow benchmark and left alone. Where the
+truth of all pixels is there, it is the truth, and the mask is where the truth of the pixels visible in both views has
+one; else the truth is the latter, and the mask is all of it.
 """
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -21,35 +15,61 @@ import numpy as np
 from semidense.datasets.arrays import ImageArray
 from semidense.datasets.benchmarks.folders import contents, open_folder
 from semidense.datasets.errors import DatasetError, LayoutError
+from semidense.datasets.formats.calibration.cameras import PairCalibration
+from semidense.datasets.formats.calibration.reading import read_cameras
 from semidense.datasets.formats.images import image_size
 from semidense.datasets.formats.png16 import read_png16
 from semidense.datasets.readers import read_pair
-from semidense.datasets.scene import DisparityRange, Parameter, SceneSource, Truth
-
-DISPARITIES = DisparityRange(0, 127)
-"""A fixed choice, as the benchmark publishes no range: nearly all of the truth is below 128 px."""
+from semidense.datasets.scene import DisparityRange, Parameter, SceneSource, Split, Truth
 
 _FRAMES = "*_10.png"
 
 
-def list_scenes(argument: str) -> tuple[SceneSource, ...]:
-    """List the scenes, in the order of their numbers.
+@dataclass(frozen=True)
+class Edition:
+    """Say how one of the benchmarks names its folders.
+
+    Attributes:
+        name: Of the benchmark, as in a specification.
+        views: Folders of the left and of the right view, in the order in which they are looked for.
+        truth: Folder of the truth of all pixels, and of those visible in both views.
+        calibration: Folder of the calibrations.
+        disparities: The range to search; None for that of the scene's truth.
+        split: Whether a scene with a truth may be trained on.
+    """
+
+    name: str
+    views: tuple[tuple[str, str], ...]
+    truth: tuple[str, str]
+    calibration: str
+    disparities: DisparityRange | None
+    split: Split
+
+
+LARGEST = DisparityRange(0, 255)
+"""What KITTI's format of truth can hold."""
+
+
+def scenes(edition: Edition, argument: str) -> tuple[SceneSource, ...]:
+    """List the scenes of an edition at a folder or in its ``training``, in the order of their numbers.
 
     Raises:
         LayoutError: If a folder or the counterpart of a left view is missing.
-        DatasetError: If the folder is missing or an image's header is not valid.
+        DatasetError: If the folder is missing, or an image's header or a calibration is not valid.
     """
-    root = open_folder(argument, "kitti2015:DIR")
-    folder = root if (root / "image_2").is_dir() else root / "training"
+    root = open_folder(argument, f"{edition.name}:DIR")
+    folder, place = _views(edition, root)
     # Hidden files, such as those that macOS adds, begin with a dot; the pattern alone would take them.
-    names = sorted(path.name for path in (folder / "image_2").glob(_FRAMES) if not path.name.startswith("."))
+    names = sorted(path.name for path in (folder / edition.views[place][0]).glob(_FRAMES) if path.name[0] != ".")
     if not names:
+        left, right = edition.views[0]
         raise LayoutError(
-            f"{root}: no KITTI 2015 scene; expected [training/]image_2/{_FRAMES} and image_3; found {contents(root)}"
+            f"{root}: no KITTI {edition.name.removeprefix('kitti')} scene; expected [training/]{left}/{_FRAMES} and "
+            f"{right}; found {contents(root)}"
         )
-    roles = _folders(folder)
+    roles = _folders(edition, folder, place)
     _check_counterparts(roles, names)
-    return tuple(_source(roles, name) for name in names)
+    return tuple(_source(edition, roles, folder / edition.calibration, name) for name in names)
 
 
 def read_images(files: Mapping[str, Path], parameters: Mapping[str, Parameter]) -> tuple[ImageArray, ImageArray]:
@@ -66,10 +86,17 @@ def read_truth(files: Mapping[str, Path], parameters: Mapping[str, Parameter]) -
     return Truth(truth, ~np.isnan(visible) & ~np.isnan(truth), "non-occluded truth")
 
 
-def _folders(folder: Path) -> dict[str, Path]:
-    truths = [folder / name for name in ("disp_occ_0", "disp_noc_0") if (folder / name).is_dir()]
-    roles = {"left": folder / "image_2", "right": folder / "image_3"}
-    return roles | dict(zip(("truth", "truth_nonocc"), truths, strict=False))
+def _views(edition: Edition, root: Path) -> tuple[Path, int]:
+    """Return the folder that holds the views, and which of the edition's views those are."""
+    candidates = [(folder, place) for folder in (root, root / "training") for place in range(len(edition.views))]
+    found = (each for each in candidates if (each[0] / edition.views[each[1]][0]).is_dir())
+    return next(found, (root / "training", 0))
+
+
+def _folders(edition: Edition, folder: Path, place: int) -> dict[str, Path]:
+    truths = [folder / name for name in edition.truth if (folder / name).is_dir()]
+    left, right = (folder / name for name in edition.views[place])
+    return {"left": left, "right": right} | dict(zip(("truth", "truth_nonocc"), truths, strict=False))
 
 
 def _check_counterparts(roles: Mapping[str, Path], names: list[str]) -> None:
@@ -77,20 +104,36 @@ def _check_counterparts(roles: Mapping[str, Path], names: list[str]) -> None:
         missing = [name for name in names if not (folder / name).is_file()]
         if missing:
             raise LayoutError(
-                f"{folder}: lacks {len(missing)} of the {len(names)} frames of image_2, {missing[0]} first; "
-                "every left view needs its counterpart of the same name"
+                f"{folder}: lacks {len(missing)} of the {len(names)} frames of {roles['left'].name}, {missing[0]} "
+                "first; every left view needs its counterpart of the same name"
             )
 
 
-def _source(roles: Mapping[str, Path], name: str) -> SceneSource:
+def _source(edition: Edition, roles: Mapping[str, Path], calibrations: Path, name: str) -> SceneSource:
     files = {role: folder / name for role, folder in roles.items()}
+    size = image_size(files["left"])
+    known = _calibration(name, size, calibrations, roles["left"].name)
     return SceneSource(
         name=Path(name).stem,
-        dataset="kitti2015",
-        split="test",
-        size=image_size(files["left"]),
-        disparities=DISPARITIES,
+        dataset=edition.name,
+        split=edition.split if "truth" in files else "test",
+        size=size,
+        disparities=edition.disparities or _range_of_truth(files),
         reader=__name__,
         files=files,
         has_truth="truth" in files,
+        calibration=known.calibration if known else None,
+        warnings=known.warnings if known else (),
     )
+
+
+def _calibration(name: str, size: tuple[int, int], folder: Path, left: str) -> PairCalibration | None:
+    path = folder / f"{name.partition('_')[0]}.txt"
+    return read_cameras([path], folder=left).fitted(name, size) if path.is_file() else None
+
+
+def _range_of_truth(files: Mapping[str, Path]) -> DisparityRange:
+    if "truth" not in files:
+        return LARGEST
+    truth = read_png16(files["truth"])
+    return DisparityRange(0, math.ceil(np.nanmax(truth))) if not np.isnan(truth).all() else LARGEST

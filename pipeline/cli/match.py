@@ -135,7 +135,8 @@ def _carry_out(
     summaries = save_all(found, output, kinds)
     for each in found:
         for warning in each.warnings:
-            print(f"warning: {each.scene.name}: {warning} (see survey.png)", file=sys.stderr)
+            where = "" if warning in each.scene.warnings else " (see survey.png)"
+            print(f"warning: {each.scene.name}: {warning}{where}", file=sys.stderr)
     if as_json:
         console.print_json({"pairs": summaries})
         return

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from semidense.datasets import DisparityRange
+from semidense.datasets import Calibration, DisparityRange
 from semidense.stages.disparity.survey import ENOUGH, FIELDS
 from semidense.stages.stage import Array
 
@@ -15,14 +15,15 @@ _LEAST_OFFSET = 1.0
 """A vertical offset below this does no harm: a patch is 11 px high."""
 
 
-def findings(survey: Mapping[str, Array], searched: DisparityRange | None, doffs: float = 0.0) -> list[str]:
+def findings(
+    survey: Mapping[str, Array], searched: DisparityRange | None, known: Calibration | None = None
+) -> list[str]:
     """Return a line for each thing that a user should look into; none for a sound pair.
 
     Args:
         survey: the product's arrays.
         searched: the range of disparities that the user gave; None if an end of it is estimated.
-        doffs: column of the right principal point minus that of the left, px: a point at infinity has the disparity
-            ``-doffs``.
+        known: the pair's calibration: a point at infinity has the disparity ``-doffs``.
     """
     if survey["equal"][0] >= _EQUAL:
         return [f"the two views are the same picture ({100 * survey['equal'][0]:.1f} % of their pixels are equal)"]
@@ -30,7 +31,10 @@ def findings(survey: Mapping[str, Array], searched: DisparityRange | None, doffs
     if matches["y"].size < ENOUGH:
         return [f"only {matches['y'].size} places agree between the views: are they of the same scene, and rectified?"]
     step = float(survey["step"][0])
-    return [*_exchanged(matches["disparity"], step, searched, doffs), *_unrectified(matches["vertical"], step)]
+    return [
+        *_exchanged(matches["disparity"], step, searched, known.doffs if known else 0.0),
+        *_unrectified(matches["vertical"], step),
+    ]
 
 
 def _exchanged(disparity: Array, step: float, searched: DisparityRange | None, doffs: float) -> Iterator[str]:

@@ -146,10 +146,7 @@ class Match:
     def points(self) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
         """Return the points in space, (point, 3) float32 metres (right, up, towards the viewer), and their colours.
 
-        Without a principal point in the calibration, the image's centre stands for it.
-
-        Raises:
-            UsageError: if the pair has no calibration.
+        Without a principal point in the calibration, the image's centre stands for it. Raises what `calibration` does.
         """
         from semidense.pipeline.figures.colours import view_rgb  # Matplotlib takes a second to load
 
@@ -212,9 +209,8 @@ class Match:
     @property
     def warnings(self) -> list[str]:
         """What looks wrong with the pair: its files, its calibration, or exchanged, unrectified or identical views."""
-        known = self.scene.calibration
         searched = None if self.scene.open_ends else self.disparities
-        return [*self.scene.warnings, *findings(self.survey, searched, known.doffs if known else 0.0)]
+        return [*self.scene.warnings, *findings(self.survey, searched, self.scene.calibration)]
 
     def made(self, product: str) -> Made:
         """Return the result of one of the pair's products.

@@ -23,7 +23,7 @@ IMAGES = Stage(
     product="images",
     inputs=(),
     outputs=(
-        Output("left", ("y", "x", "band"), None, "1", "left view, the reference; 8 or 16 bits as in the file"),
+        Output("left", ("y", "x", "band"), None, "1", "left view, the reference; 8 or 16 bits"),
         Output("right", ("y", "x", "band"), None, "1", "right view"),
         Output("moments", ("view", "moment"), "float64", "1", "mean and standard deviation of each view's 8-bit gray"),
     ),

@@ -170,7 +170,8 @@ def build(request: Request) -> Graph:
         UsageError: if there is nothing to do, or settings do not go together.
         StageError: if shipped weights are needed and there are none.
     """
-    graph = Graph(notes=list(request.notes))
+    doubts = (f"{scene.name}: {warning}" for scene in request.dataset.scenes for warning in scene.warnings)
+    graph = Graph(notes=[*request.notes, *doubts])
     trained_on = [scene.image_identity() for scene in request.training if request.leave_out]
     for variant, config in request.configs.items():
         builder = _Builder(graph, config, request)

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from semidense.datasets.formats.pfm import read_pfm
 from semidense.datasets.occlusion import warped_truth_mask
 from semidense.datasets.registry import Dataset, open_dataset
 
-PATHS = {"middlebury": "middlebury", "kitti2015": "kitti2015", "eth3d": "eth3d"}
+PATHS = {"middlebury": "middlebury", "kitti2012": "kitti2012", "kitti2015": "kitti2015", "eth3d": "eth3d"}
 WRONG_SCALES = (-1, 0, 0.25, 0.5, 0.9, 1.1, 2, 4)
 SAMPLES = [
     pytest.param("middlebury", "2001/Tsukuba", "published", id="scale 16"),
@@ -20,6 +21,7 @@ SAMPLES = [
     pytest.param("middlebury", "Aloe", "left-right check", id="2006, scale 3"),
     pytest.param("middlebury", "trainingQ/Teddy", "published", id="PFM with an odd scale line"),
     pytest.param("middlebury", "Motorcycle", "published", id="PFM"),
+    pytest.param("kitti2012", "000007_10", "non-occluded truth", id="sparse, gray"),
     pytest.param("kitti2015", "000005_10", "non-occluded truth", id="sparse"),
     pytest.param("eth3d", "playground_1l", "warped truth", id="gray"),
 ]
@@ -30,7 +32,7 @@ def benchmarks(stereo_data: Path) -> dict[str, Dataset]:
     return {name: open_dataset(f"{name}:{stereo_data / path}") for name, path in PATHS.items()}
 
 
-def test_all_69_scenes_are_found_and_split(benchmarks: dict[str, Dataset]) -> None:
+def test_all_185_scenes_are_found_and_split(benchmarks: dict[str, Dataset]) -> None:
     scenes = [scene for dataset in benchmarks.values() for scene in dataset.scenes]
     assert Counter((scene.dataset, scene.split) for scene in scenes) == {
         ("middlebury/MiddEval3", "test"): 23,
@@ -38,10 +40,11 @@ def test_all_69_scenes_are_found_and_split(benchmarks: dict[str, Dataset]) -> No
         ("middlebury/2003", "train"): 1,
         ("middlebury/2005", "train"): 5,
         ("middlebury/2006", "train"): 16,
+        ("kitti2012", "train"): 116,
         ("kitti2015", "test"): 16,
         ("eth3d", "test"): 1,
     }
-    assert sum(scene.has_truth for scene in scenes) == 69 - 15
+    assert sum(scene.has_truth for scene in scenes) == 185 - 15
 
 
 def test_every_scene_loads_and_its_truth_lies_in_its_range(benchmarks: dict[str, Dataset]) -> None:
@@ -75,3 +78,9 @@ def test_the_warped_truth_comes_near_the_published_mask(benchmarks: dict[str, Da
     assert truth is not None
     known = ~np.isnan(truth.disparity)
     assert (warped_truth_mask(truth.disparity) == truth.nonocc)[known].mean() > 0.97
+
+
+def test_the_rendered_pair_has_spaces_in_its_pfm_header(stereo_data: Path) -> None:
+    truth = read_pfm(stereo_data / "sceneflow" / "flyingthings_0032_0006" / "disp0.pfm")
+    assert truth.shape == (540, 960)
+    assert (round(float(np.nanmin(truth))), round(float(np.nanmax(truth)))) == (1, 130)

@@ -84,7 +84,24 @@ def test_names_must_be_unique() -> None:
 def test_describe_lists_what_open_dataset_takes() -> None:
     patterns = [pattern for pattern, _ in describe()]
     assert patterns == [
-        *("motorcycle", "middlebury:DIR", "kitti2015:DIR", "eth3d:DIR", "synthetic[:KEY=VALUE,...]"),
-        "pair:LEFT,RIGHT[,KEY=VALUE,...]",
+        *("motorcycle", "middlebury:DIR", "kitti2012:DIR", "kitti2015:DIR", "eth3d:DIR", "synthetic[:KEY=VALUE,...]"),
+        *("pair:LEFT,RIGHT[,KEY=VALUE,...]", "toml:FILE"),
     ]
     assert all(description for _, description in describe())
+
+
+def test_data_sets_joined_by_a_plus_keep_their_scenes(tmp_path: Path) -> None:
+    both = open_dataset("synthetic:train=1,test=0+motorcycle")
+    apart = [scene for spec in ("synthetic:train=1,test=0", "motorcycle") for scene in open_dataset(spec).scenes]
+    assert both.scenes == tuple(apart)
+    assert both.spec == "synthetic:train=1,test=0+motorcycle"
+
+
+def test_a_plus_in_the_name_of_a_folder_is_no_join(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"a\+b: no such folder"):
+        open_dataset(f"eth3d:{tmp_path}/a+b")
+
+
+def test_the_same_data_set_twice_is_refused() -> None:
+    with pytest.raises(DatasetError, match="several scenes are named"):
+        open_dataset("motorcycle+motorcycle")

@@ -107,7 +107,7 @@ def test_a_bad_picture_is_one_line_and_leaves_nothing(
         pytest.param(["{}/im0.png", "{}/im1.png", "--R", "0.5", "--density", "50%"], ["one of them"], id="both"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--max-error", "2", "--R", "1"], ["such as 2%"], id="200 % error"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--format", "jpeg"], ["no format 'jpeg'"], id="no such format"),
-        pytest.param(["{}/im0.png", "{}/im1.png", "--calib", "{}/im0.png"], ["no plain text"], id="a picture as calib"),
+        pytest.param(["{}/im0.png", "{}/im1.png", "--calib", "{}/im0.png"], ["not plain text"], id="a picture"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--calib", "{}/none"], ["none"], id="no calibration there"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--calib", "{}/calib.txt", "--unit", "ft"], ["mm, cm, m"], id="unit"),
     ],

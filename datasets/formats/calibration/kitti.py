@@ -23,7 +23,8 @@ from semidense.datasets.formats.calibration.text import Matrix, matrix
 
 _LINE = re.compile(r"^(\w+):((?:[ \t]+[-+.\deE]+)+)[ \t]*$", re.MULTILINE)
 _SYSTEMS = (("P1_roi", "P2_roi"), ("P_rect_02", "P_rect_03"), ("P_rect_00", "P_rect_01"), ("P2", "P3"), ("P0", "P1"))
-_FOLDER = re.compile(r"image_0?([0-3])")
+_FOLDERS = {"image_0": "0", "image_00": "0", "image_2": "2", "image_02": "2", "colored_0": "2"}
+"""Number of the camera that a left view's folder tells."""
 _WANTED = "expected P2 and P3, P0 and P1, P_rect_02 and P_rect_03, or P1_roi and P2_roi"
 
 
@@ -38,8 +39,9 @@ def kitti_cameras(path: Path, text: str, folder: str | None = None) -> Cameras:
     Args:
         path: The file, for messages.
         text: Its content.
-        folder: Name of the left view's folder: ``image_0`` and ``image_00`` mean the gray cameras, ``image_2`` and
-            ``image_02`` the colour ones. Elsewhere the colour cameras are taken, and a warning gives both baselines.
+        folder: Name of the left view's folder: ``image_0`` and ``image_00`` mean the gray cameras, ``image_2``,
+            ``image_02`` and ``colored_0`` the colour ones. Elsewhere the colour cameras are taken, and a warning gives
+            both baselines.
 
     Raises:
         CalibrationError: If there are no two cameras that belong together.
@@ -55,8 +57,8 @@ def kitti_cameras(path: Path, text: str, folder: str | None = None) -> Cameras:
 
 def _chosen(pairs: list[tuple[str, str]], folder: str | None) -> tuple[str, str]:
     """Return the pair whose left camera has the number of the folder, else the first one."""
-    number = _FOLDER.fullmatch(folder or "")
-    same = [pair for pair in pairs if number and pair[0] in (f"P{number[1]}", f"P_rect_0{number[1]}")]
+    number = _FOLDERS.get(folder or "")
+    same = [pair for pair in pairs if number and pair[0] in (f"P{number}", f"P_rect_0{number}")]
     return (same or pairs)[0]
 
 
@@ -64,7 +66,7 @@ def _unsure(
     path: Path, lines: Mapping[str, list[str]], pairs: list[tuple[str, str]], folder: str | None
 ) -> tuple[str, ...]:
     rivals = [pair for pair in pairs if pair[0][-1] in "02"]
-    if len(rivals) < 2 or "P1_roi" in lines or _FOLDER.fullmatch(folder or ""):
+    if len(rivals) < 2 or "P1_roi" in lines or folder in _FOLDERS:
         return ()
     one, other = (_baseline(path, lines, pair) for pair in rivals[:2])
     return (

@@ -1,6 +1,6 @@
 """Read a calibration from named values: OpenCV's ``P1`` and ``P2``, or ``Q``, or a camera matrix and a baseline.
 
-OpenCV's ``FileStorage`` (YAML, XML, JSON) holds them, and JSON that people write themselves::
+OpenCV's ``FileStorage`` (YAML, XML, JSON) holds them, and JSON or YAML that people write themselves::
 
     {"P1": [[...], ...], "P2": [[...], ...], "image_width": 640, "image_height": 480, "unit": "mm"}
     {"K": [[600, 0, 320], [0, 600, 240], [0, 0, 1]], "baseline": 0.12, "unit": "m"}

@@ -18,7 +18,7 @@ from semidense.datasets.formats.calibration.text import named_lines, read_text
 UNDERSTOOD = (
     "Middlebury's calib.txt (cam0=[...]); OpenCV's YAML, XML or JSON (P1 and P2, or Q); ROS's CameraInfo, a left and a "
     "right file; KITTI's (P2: ..., P_rect_02: ..., P1_roi: ...); a K.txt of nine numbers and the baseline in metres; "
-    "JSON with fx, fy, cx, cy or K, and baseline; a stereo sensor's camera.A=[...] and t=..."
+    "JSON or YAML with fx, fy, cx, cy or K, and baseline; a stereo sensor's camera.A=[...] and t=..."
 )
 """The formats, for messages."""
 
@@ -62,6 +62,8 @@ def _plain(path: Path, text: str, folder: str | None) -> Cameras:
         return key_value_cameras(named_lines(path, text))
     if re.search(r"^\s*(cam[01]|doffs|ndisp)\s*=", text, re.MULTILINE):
         return middlebury_cameras(named_lines(path, text))
+    if re.search(r"^(P1|Q|baseline)\s*:", text, re.MULTILINE | re.IGNORECASE):
+        return matrices_cameras(path, yaml_values(path, text))
     if numbers := numbers_only(text):
         return intrinsics_cameras(path, numbers)
     raise CalibrationError(f"{path}: no known calibration format{_single_ros(text)}. Known are: {UNDERSTOOD}")

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from semidense.datasets import DisparityRange
+from semidense.datasets import Calibration, DisparityRange
 from semidense.pipeline.pairs.findings import findings
 from semidense.stages.disparity.survey import ENOUGH
 
@@ -55,7 +55,7 @@ def test_negative_disparities_that_were_asked_for_are_no_surprise(low: int, warn
     ],
 )
 def test_negative_disparities_that_the_calibration_explains_are_no_surprise(doffs: float, warned: bool) -> None:
-    assert bool(findings(survey(-20), None, doffs)) == warned
+    assert bool(findings(survey(-20), None, Calibration(500, 120, doffs))) == warned
 
 
 def test_the_way_out_of_negative_disparities_is_not_only_to_exchange_the_views() -> None:

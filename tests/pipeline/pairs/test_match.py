@@ -280,3 +280,21 @@ def test_importing_the_verb_stays_light(project: Path) -> None:
     code = "import sys, pipeline; pipeline.match; print(*({'torch', 'zarr', 'matplotlib', 'cv2'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], cwd=project, capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+def test_a_calibration_does_not_cut_off_negative_disparities(folder: Path) -> None:
+    (folder / "ahead.txt").write_text(CALIB.replace("doffs=2", "doffs=0").replace("100 0 32", "100 0 30"))
+    files = folder / "right.png", folder / "left.png"
+    found = match(*files, calib=folder / "ahead.txt", cache=folder / "cache")
+    assert found.disparities.minimum <= -6
+    assert found.disparities.maximum == 8, "the calibration's end stays"
+    assert np.median(found.raw[:, 16:64]) < -1
+    assert "exchanged" in found.warnings[0]
+
+
+def test_what_contradicts_itself_in_the_calibration_is_told(folder: Path) -> None:
+    (folder / "odd.txt").write_text(CALIB.replace("cam1=[100 0 32; 0 100 20", "cam1=[100 0 32; 0 100 23"))
+    found = match(folder / "left.png", folder / "right.png", calib=folder / "odd.txt", cache=folder / "cache")
+    assert len(found.warnings) == 1
+    assert "20" in found.warnings[0] and "23" in found.warnings[0]
+    assert any("cy is 20" in note for note in found.result.plan.notes)

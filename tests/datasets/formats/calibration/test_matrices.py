@@ -45,6 +45,20 @@ def test_json(tmp_path: Path, values: dict[str, object], doffs: float, size: tup
     assert read_cameras([saved(tmp_path, {**values, "unit": "m"})]) == found
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param("fx: 500\nfy: 500\ncx: 311\ncy: 250\ndoffs: 30\nbaseline: 0.12\nunit: m\n", id="numbers"),
+        pytest.param(f"---\nP1: {P1}\nP2: {P2}\nunit: m\n", id="matrices"),
+    ],
+)
+def test_yaml_of_ones_own(tmp_path: Path, text: str) -> None:
+    (tmp_path / "c.yaml").write_text(text)
+    known = read_cameras([tmp_path / "c.yaml"]).calibration
+    assert replace(known, baseline=120) == Calibration(500, 120, 30, (311, 250))
+    assert known.baseline == pytest.approx(120)
+
+
 def test_json_of_opencv(tmp_path: Path) -> None:
     storage = cv2.FileStorage(str(tmp_path / "c.json"), cv2.FILE_STORAGE_WRITE)
     storage.write("P1", np.array(P1))

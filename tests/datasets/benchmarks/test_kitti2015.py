@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from semidense.datasets.benchmarks.kitti import list_scenes
+from semidense.datasets.benchmarks.kitti2015 import list_scenes
 from semidense.datasets.errors import DatasetError, LayoutError
 from semidense.datasets.formats.png16 import write_png16
 from semidense.datasets.scene import DisparityRange
@@ -82,3 +82,20 @@ def test_no_scene_names_what_was_expected_and_found(tmp_path: Path) -> None:
     (tmp_path / "image_02").mkdir()
     with pytest.raises(LayoutError, match=r"expected \[training/\]image_2/\*_10.png and image_3; found image_02"):
         list_scenes(str(tmp_path))
+
+
+def test_the_files_that_macos_adds_are_passed_over(root: Path) -> None:
+    (root / "training/image_2/._000003_10.png").write_bytes(b"Mac OS X")
+    assert len(list_scenes(str(root))) == 2
+
+
+def test_a_calibration_gives_depth(root: Path) -> None:
+    folder = root / "training/calib_cam_to_cam"
+    folder.mkdir()
+    (folder / "000003.txt").write_text(
+        "S_rect_02: 8 6\nP_rect_02: 7 0 4 0.7 0 7 3 0 0 0 1 0\nS_rect_03: 8 6\nP_rect_03: 7 0 4 -3.5 0 7 3 0 0 0 1 0\n"
+    )
+    known, other = (source.calibration for source in list_scenes(str(root)))
+    assert known is not None
+    assert (known.focal, known.centre, round(known.baseline, 6)) == (7, (4, 3), 600)
+    assert other is None

@@ -1,0 +1,104 @@
+"""A data set of one's own, described in a file."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from semidense.datasets import DatasetError, DisparityRange, open_dataset, write_pfm
+
+Save = Callable[..., Path]
+VIEWS = 'left = "left/*.png"\nright = "right/*.png"\n'
+SCENES = 'left = "scenes/*/im0.png"\nright = "scenes/*/im1.png"\n'
+TRUTH = np.array([[2, 3, np.inf, 5]] * 3, np.float32)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, save_image: Save) -> Path:
+    for name in ("a", "b"):
+        for place in (f"left/{name}.png", f"right/{name}.png", f"scenes/{name}/im0.png", f"scenes/{name}/im1.png"):
+            save_image(tmp_path / place, np.full((3, 4), 90, np.uint8))
+    for place in ("disp", "scenes/b"):
+        (tmp_path / place).mkdir(exist_ok=True)
+    write_pfm(tmp_path / "disp/b.pfm", TRUTH)
+    Image.fromarray(np.where(np.isinf(TRUTH), 0, TRUTH * 16).astype(np.uint16)).save(tmp_path / "disp/b.png")
+    return tmp_path
+
+
+def described(folder: Path, text: str) -> str:
+    (folder / "orchard.toml").write_text(text)
+    return f"toml:{folder}/orchard.toml"
+
+
+@pytest.mark.parametrize("views", [VIEWS, SCENES], ids=["by file", "by folder"])
+@pytest.mark.parametrize(
+    "truth",
+    [
+        pytest.param('truth = "disp/*.pfm"\n', id="PFM"),
+        pytest.param('truth = "disp/*.png"\nscale = 16\n', id="an image of 16 steps to a pixel"),
+    ],
+)
+def test_what_is_described_is_read(folder: Path, views: str, truth: str) -> None:
+    one, other = open_dataset(described(folder, f'{views}{truth}split = "train"\n')).scenes
+    assert [one.name, other.name] == ["a", "b"]
+    assert (one.has_truth, one.open_ends) == (False, ("minimum", "maximum"))
+    assert (other.dataset, other.split, other.disparities) == ("orchard", "train", DisparityRange(0, 5))
+    loaded = other.load()
+    assert loaded.truth is not None
+    np.testing.assert_array_equal(loaded.truth.disparity, np.where(np.isinf(TRUTH), np.nan, TRUTH))
+    assert loaded.left.tolist() == np.full((3, 4), 90).tolist()
+
+
+def test_range_calibration_and_mask(folder: Path, save_image: Save) -> None:
+    (folder / "K.txt").write_text("100 0 2 0 100 1 0 0 1 0.5")
+    save_image(folder / "mask/b.png", np.full((3, 4), 255, np.uint8))
+    text = f'{VIEWS}truth = "disp/*.pfm"\nmask = "mask/*.png"\ncalib = "K.txt"\nd_min = -1\nd_max = 3\n'
+    for scene in open_dataset(described(folder, text)).scenes:
+        assert (scene.disparities, scene.open_ends) == (DisparityRange(-1, 3), ())
+        assert scene.calibration is not None
+        assert scene.calibration.baseline == 500
+    truth = scene.load_truth()
+    assert truth is not None
+    assert (truth.mask, int(truth.nonocc.sum())) == ("published", 9)
+
+
+def test_the_scale_is_part_of_what_the_truth_is(folder: Path) -> None:
+    texts = (f'{VIEWS}truth = "disp/*.png"\nscale = {scale}\n' for scale in (16, 32))
+    one, other = (open_dataset(described(folder, text)).scenes[1] for text in texts)
+    assert one.truth_identity() != other.truth_identity()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        pytest.param('left = "left/*.png"\n', 'no right; write a pattern such as right = "right/', id="no right"),
+        pytest.param(VIEWS + "depth = 3\n", "depth is not known; known are left, right", id="unknown"),
+        pytest.param(VIEWS + 'd_max = "far"\n', "d_max = 'far'; expected a number", id="text for a number"),
+        pytest.param(VIEWS + "d_max = true\n", "d_max = True; expected a number", id="truth for a number"),
+        pytest.param(VIEWS + 'split = "val"\n', "split = 'val'; give train or test", id="split"),
+        pytest.param(VIEWS + 'truth = "disp/*.png"\n', "no scale; the truth is an image", id="no scale"),
+        pytest.param(VIEWS + "scale = 0\n", "scale = 0", id="zero scale"),
+        pytest.param('left = "*/*.png"\nright = "right/*.png"\n', r"give one \*", id="two stars"),
+        pytest.param('left = "none/*.png"\nright = "right/*.png"\n', "no left view", id="nothing there"),
+        pytest.param('left = "left/*.png"\nright = "scenes/*/im1.jpg"\n', "no right view for .*a.png", id="no pair"),
+        pytest.param("left = [\n", "no valid TOML", id="no TOML"),
+    ],
+)
+def test_a_bad_description_is_one_line(folder: Path, text: str, message: str) -> None:
+    with pytest.raises(DatasetError, match=message) as refused:
+        open_dataset(described(folder, text))
+    assert "\n" not in str(refused.value)
+
+
+def test_the_rendered_pair_as_a_description(stereo_data: Path, tmp_path: Path) -> None:
+    source = stereo_data / "sceneflow"
+    (tmp_path / "data").symlink_to(source)
+    text = 'left = "data/*/left.png"\nright = "data/*/right.png"\ntruth = "data/*/disp0.pfm"\n'
+    files = {path.name for path in (source / "flyingthings_0032_0006").iterdir()}
+    assert {"left.png", "right.png", "disp0.pfm"} <= files
+    (scene,) = open_dataset(described(tmp_path, text + 'truth_right = "data/*/disp1.pfm"\n')).scenes
+    assert (scene.name, scene.size) == ("flyingthings_0032_0006", (540, 960))
+    values = np.frombuffer((source / scene.name / "disp0.pfm").read_bytes()[-4 * 540 * 960 :], "<f4")
+    assert scene.disparities == DisparityRange(0, int(np.ceil(values.max())))
