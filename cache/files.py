@@ -71,14 +71,23 @@ def is_folder(path: Path) -> bool:
     return path.is_dir() and not path.is_symlink()
 
 
+def require_no_link(path: Path) -> None:
+    """Refuse a link.
+
+    Raises:
+        OSError: if ``path`` is one.
+    """
+    if path.is_symlink():
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+
+
 def make_folder(path: Path) -> None:
     """Make a folder and its parents; each new name is on disk before this returns.
 
     Raises:
         OSError: if that is not possible, or a link stands in the folder's place.
     """
-    if path.is_symlink():
-        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    require_no_link(path)
     missing = [folder for folder in (path, *path.parents) if not folder.is_dir()]
     for folder in reversed(missing):
         folder.mkdir(exist_ok=True)

@@ -311,7 +311,9 @@ class _Builder:
         return replace(self, config=config)._add_stage(stage, params, None, inputs)
 
     def _add_source(self, source: Source, scene: SceneSource) -> str:
-        return self._add(source.stage, scene, scene, source.identity(scene), {}, scene.reader)
+        identity = source.identity(scene)
+        known = replace(scene, digests=identity["files"])  # what is read must be what the key names
+        return self._add(source.stage, scene, known, identity, {}, scene.reader)
 
     def _add_stage(
         self, stage: Stage, params: Params, scene: SceneSource | None, inputs: Mapping[str, tuple[str, ...]]

@@ -86,9 +86,9 @@ def _layer(maps: NDArray[np.float32]) -> Tensor:
     return torch.from_numpy(maps[:, None] / np.float32(DISPARITY_UNIT)).contiguous(memory_format=torch.channels_last)
 
 
+@one_thread()
 def compute_ccnn(_: NoParams, inputs: Inputs) -> Arrays:
     """Compute the product ``ccnn`` of a block that brings 4 px of context on every side."""
-    one_thread()
     net = Ccnn()
     from_vector(net, inputs["ccnn_net"]["parameters"])
     net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
