@@ -59,9 +59,9 @@ def _copied(path: Path, digest: str, folder: Path) -> Path:
 def _read(path: Path) -> bytes:
     try:
         if not stat.S_ISREG(path.stat().st_mode):
-            raise MissingFileError(f"{path}: it is not a plain file")
+            raise MissingFileError(f"{path}: cannot be read (it is not a plain file)")
         return path.read_bytes()
+    except MissingFileError:
+        raise
     except OSError as error:
-        if isinstance(error, MissingFileError):
-            raise
         raise MissingFileError(f"{path}: cannot be read ({error.strerror})") from error

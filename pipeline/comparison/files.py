@@ -1,14 +1,13 @@
 """What a comparison leaves: tables, ``comparison.csv``, ``comparison.json``, and figures."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from semidense.datasets.formats.atomic import atomic_write
 from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.figures import density_figure, dots_figure, sheets
-from semidense.pipeline.comparison.rows import Row
 from semidense.pipeline.comparison.tables import THRESHOLD, TITLES, at, of, quoted
 from semidense.pipeline.files.writing import explaining, save_png, table_text, writable_folder
 from semidense.pipeline.results.metric_rows import FIGURES

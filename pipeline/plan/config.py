@@ -268,9 +268,10 @@ def one_line(error: ValidationError) -> str:
     first = error.errors(include_url=False)[0]
     name = ".".join(str(part) for part in first["loc"])
     more = f" ({error.error_count() - 1} more)" if error.error_count() > 1 else ""
-    return f"configuration: {name} = {_shortened(first['input'])}: {first['msg']}{more}"
+    return f"configuration: {name} = {shortened(first['input'])}: {first['msg']}{more}"
 
 
-def _shortened(value: object) -> str:
+def shortened(value: object) -> str:
+    """Return a value as a message repeats it, the start of a very long one."""
     text = repr(value)
     return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}… ({len(text):,} characters)"

@@ -189,7 +189,7 @@ def _targets(builder: "_Builder", trained_on: Sequence[Mapping[str, Any]]) -> It
         yield builder.product(upto, None)
         return
     for scene in builder.request.dataset.scenes:
-        if scene.image_identity() in trained_on:
+        if trained_on and scene.image_identity() in trained_on:
             notes.append(f"{scene.name} is a training scene: it is left out, since nothing is tested on it")
         elif not scene.has_truth and "truth" in made_from(upto):
             notes.append(f"{scene.name} has no ground truth: no {upto} can be made for it")
