@@ -125,7 +125,7 @@ def make_read_only(path: Path) -> None:
 
 def walk(folder: Path, prefix: str = "") -> Iterator[tuple[str, os.DirEntry[str]]]:
     """Yield all that is below ``folder``, each with its path relative to it; links are not followed."""
-    with os.scandir(folder / prefix) as things:
+    with os.scandir(f"{folder}/{prefix}") as things:  # many small files: building paths would take most of the time
         for thing in things:
             yield f"{prefix}{thing.name}", thing
             if thing.is_dir(follow_symlinks=False):
