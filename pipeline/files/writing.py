@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # an export of maps does without matplotlib's figures, which 
     from matplotlib.figure import Figure
 
 
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+_FORMULA = ("=", "+", "-", "@")
 """What makes a cell a formula to a spreadsheet."""
 
 
@@ -46,7 +46,10 @@ def table_text(rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> str
 
 
 def _plain(value: object) -> object:
-    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
+    if not isinstance(value, str):
+        return value
+    text = value.replace("\r", " ")  # which would end the row
+    return f"'{text}" if text.lstrip().startswith(_FORMULA) else text
 
 
 def save_png(figure: "Figure", path: Path) -> None:
