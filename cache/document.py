@@ -128,7 +128,8 @@ def laid_out(compact: str) -> str:
 
     A plan reads thousands of documents, and compares each with how it would be written.
     """
-    parts, line = [], "\n"
+    parts: list[str] = []
+    line = "\n"
     for token in _TOKEN.findall(compact):
         if token in ("{", "["):
             line += " "

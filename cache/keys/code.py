@@ -11,9 +11,7 @@ file changed since this process began is refused.
 
 import ast
 import hashlib
-import os
 import sys
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -23,6 +21,7 @@ from typing import TypeGuard
 
 from semidense.cache.document import digest
 from semidense.cache.errors import EditedSource, SourceNotFound
+from semidense.cache.keys.process_start import process_start
 
 
 @dataclass(frozen=True)
@@ -202,7 +201,7 @@ def _read(module: _Module) -> _Source:
     except (OSError, SyntaxError, ValueError, RecursionError) as error:
         raise SourceNotFound(f"cannot read the source {module.file}: {error}") from error
     if is_imported:
-        if file.stat().st_ctime > _process_start() + _TICK:
+        if file.stat().st_ctime > process_start():
             raise EditedSource(_edited(file))
         _settled.add(module.name)
     return _Source(hashed, imports, data.decode("utf-8", "replace"), stamp)
@@ -215,21 +214,6 @@ def _edited(file: Path) -> str:
 def _stamp(file: Path) -> _Stamp:
     status = file.stat()
     return status.st_ctime_ns, status.st_size, status.st_ino
-
-
-_TICK = 0.02
-"""Seconds: the kernel tells a process's start to 0.01 s, and no import happens so soon after it."""
-_IMPORTED = time.time()
-
-
-@cache
-def _process_start() -> float:
-    """Return when this process began, in seconds since the epoch; where that is not told, when this was imported."""
-    try:
-        ticks = int(Path("/proc/self/stat").read_text(errors="replace").rpartition(")")[2].split()[19])
-        return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME) + ticks / os.sysconf("SC_CLK_TCK")
-    except (OSError, AttributeError):
-        return _IMPORTED
 
 
 class _Bare(ast.NodeTransformer):
