@@ -21,7 +21,7 @@ from typing import TypeGuard
 
 from semidense.cache.document import digest
 from semidense.cache.errors import EditedSource, SourceNotFound
-from semidense.cache.keys.process_start import process_start
+from semidense.cache.keys.imported import Stamp, process_start, stamp_of
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def require_imported_as_hashed(modules: Iterable[str]) -> None:
         located = _locate(name)
         if located and located.file:
             known = _read(located)
-            if _stamp(located.file) != known.stamp and source_hash(located.file.read_bytes()) != known.hash:
+            if stamp_of(located.file) != known.stamp and source_hash(located.file.read_bytes()) != known.hash:
                 raise EditedSource(_edited(located.file))
         _settled.add(name)
 
@@ -177,7 +177,6 @@ def _locate_by_import_system(name: str) -> _Module | None:
     return _Module(name, file, folders) if file or folders else None
 
 
-_Stamp = tuple[int, int, int]
 _settled: set[str] = set()
 """Modules that are known to run the text that was hashed; what happens to their files does not matter any more."""
 
@@ -189,14 +188,14 @@ class _Source:
     hash: str
     imports: frozenset[str]
     text: str
-    stamp: _Stamp
+    stamp: Stamp
 
 
 @cache
 def _read(module: _Module) -> _Source:
     file, is_imported = module.file or Path(), module.name in sys.modules
     try:
-        stamp, data = _stamp(file), file.read_bytes()
+        stamp, data = stamp_of(file), file.read_bytes()
         imports, hashed = frozenset(_imports(ast.parse(data), module)), source_hash(data)
     except (OSError, SyntaxError, ValueError, RecursionError) as error:
         raise SourceNotFound(f"cannot read the source {module.file}: {error}") from error
@@ -209,11 +208,6 @@ def _read(module: _Module) -> _Source:
 
 def _edited(file: Path) -> str:
     return f"{file} was edited since this Python began, and may have been imported before: restart Python (the kernel)"
-
-
-def _stamp(file: Path) -> _Stamp:
-    status = file.stat()
-    return status.st_ctime_ns, status.st_size, status.st_ino
 
 
 class _Bare(ast.NodeTransformer):

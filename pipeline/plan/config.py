@@ -129,8 +129,8 @@ def _choices(name: str, products: Iterable[str]) -> type[Params]:
 
 def _read_toml(file: Path) -> dict[str, Any]:
     try:
-        if not file.is_file():
-            raise UsageError(f"configuration {file}: {'it is not a plain file' if file.exists() else 'no such file'}")
+        if file.exists() and not (file.is_file() or file.is_dir()):  # a pipe would keep us waiting
+            raise UsageError(f"configuration {file}: it is not a plain file")
         if file.stat().st_size > LONGEST_FILE:
             raise UsageError(f"configuration {file}: it has more than {LONGEST_FILE:,} bytes; is it the right file?")
         return tomllib.loads(file.read_text())

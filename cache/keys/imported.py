@@ -1,4 +1,4 @@
-"""When this process began: what it imported was read after that."""
+"""Whether a module's file changed since the module was imported: its stamp, and when this process began."""
 
 import os
 import time
@@ -8,6 +8,16 @@ from pathlib import Path
 _TICK = 0.02
 """Seconds: the kernel tells a process's start to 0.01 s, and no import happens so soon after it."""
 _IMPORTED = time.time()
+
+
+Stamp = tuple[int, int, int]
+"""Of a file: when it changed last in ns, its size in bytes, its inode."""
+
+
+def stamp_of(file: Path) -> Stamp:
+    """Return what differs after every change of a file."""
+    status = file.stat()
+    return status.st_ctime_ns, status.st_size, status.st_ino
 
 
 @cache
