@@ -8,7 +8,7 @@ from pathlib import Path
 
 from semidense.cache import Store
 from semidense.datasets.exact_files import file_digest
-from semidense.datasets.formats.calib import read_calib
+from semidense.datasets.formats.calibration.middlebury import read_calib
 from semidense.datasets.formats.images import read_image
 from semidense.datasets.formats.pfm import read_pfm
 from semidense.pipeline import api
