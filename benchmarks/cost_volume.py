@@ -26,7 +26,7 @@ from semidense.pipeline.plan.shipped_weights import read_network, shipped_weight
 from semidense.stages.baselines.declaration import SgmParams
 from semidense.stages.baselines.sgm import match_semi_global
 from semidense.stages.compute.precision import resolve
-from semidense.stages.compute.threads import one_thread
+from semidense.stages.compute.threads import keep_one_thread
 from semidense.stages.disparity.winner_takes_all import winner_take_all
 from semidense.stages.matching.cost_volume import cost_volume
 from semidense.stages.matching.declaration import CostVolumeParams
@@ -55,7 +55,7 @@ def main(
     picture: Annotated[Path, typer.Option()] = PICTURE,
 ) -> None:
     """Print the ratio and the table, write both as JSON, draw the picture."""
-    one_thread()
+    keep_one_thread()
     scene = open_dataset("motorcycle").scenes[0].load()
     ratios = list(_against_accurate(scene, crop, pairs)) if install else []
     first = (scene.left.shape[0] - rows) // 2

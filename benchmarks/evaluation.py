@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from benchmarks.harness import compare, report
-from semidense.stages.compute.threads import one_thread
+from semidense.stages.compute.threads import keep_one_thread
 from semidense.stages.evaluation.confidence import confidence
 from semidense.stages.evaluation.declaration import PATCH
 from semidense.stages.evaluation.net import EvaluationNet
@@ -20,7 +20,7 @@ PATCHES = 64
 
 def main() -> None:
     """Compare on noise: the arithmetic does not depend on what is seen. One thread on both sides."""
-    one_thread()
+    keep_one_thread()
     net = EvaluationNet()
     initialise(net, 0)
     layers = np.random.default_rng(0).normal(size=(2, *SIZE)).astype(np.float32)

@@ -21,7 +21,7 @@ from benchmarks.harness import PAIRS, Ratio, report, timed
 from semidense.datasets import SceneSource, open_dataset
 from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
 from semidense.stages.compute.precision import resolve
-from semidense.stages.compute.threads import one_thread
+from semidense.stages.compute.threads import keep_one_thread
 from semidense.stages.disparity.winner_takes_all import winner_take_all
 from semidense.stages.matching.declaration import COST_VOLUME, CostVolumeParams, Mode
 from semidense.stages.metrics.errors import raw_bad
@@ -103,7 +103,7 @@ def main(
     votes: Annotated[int, typer.Option(help="costvolume.votes")] = DEFAULTS.votes,
 ) -> None:
     """Measure each scene, print what was found of each, and report the ratios."""
-    one_thread()
+    keep_one_thread()
     nets = shipped_nets()
     scenes = [scene for scene in open_dataset(dataset).scenes if scene.has_truth]
     measure(scenes[0], nets, 4, votes)  # the warm-up, which compiles

@@ -17,7 +17,7 @@ from torch.nn import functional
 from benchmarks.harness import PAIRS, Ratio, report, timed
 from semidense.pipeline.api import Task, run
 from semidense.stages.compute.precision import dtype_of, fast_bfloat16
-from semidense.stages.compute.threads import one_thread
+from semidense.stages.compute.threads import keep_one_thread
 from semidense.stages.matching.cost_volume import valid_columns
 
 HEIGHT, WIDTH, DISPARITIES = 128, 256, 40
@@ -92,7 +92,7 @@ def rate(side: tuple[Callable[[], None], float], times: int = 10) -> float:
 
 def main() -> None:
     """Time stage and limits in turn."""
-    one_thread()
+    keep_one_thread()
     cells = HEIGHT * sum(end - first for first, end in (valid_columns(d, WIDTH) for d in range(DISPARITIES + 1)))
     dtypes = [torch.float32, *([torch.bfloat16] if fast_bfloat16() else [])]
     convolutions = {str(dtype): bare_convolutions(dtype) for dtype in dtypes}

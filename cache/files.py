@@ -71,14 +71,23 @@ def is_folder(path: Path) -> bool:
     return path.is_dir() and not path.is_symlink()
 
 
+def require_no_link(path: Path) -> None:
+    """Refuse a link.
+
+    Raises:
+        OSError: if ``path`` is one.
+    """
+    if path.is_symlink():
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+
+
 def make_folder(path: Path) -> None:
     """Make a folder and its parents; each new name is on disk before this returns.
 
     Raises:
         OSError: if that is not possible, or a link stands in the folder's place.
     """
-    if path.is_symlink():
-        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    require_no_link(path)
     missing = [folder for folder in (path, *path.parents) if not folder.is_dir()]
     for folder in reversed(missing):
         folder.mkdir(exist_ok=True)
@@ -116,7 +125,7 @@ def make_read_only(path: Path) -> None:
 
 def walk(folder: Path, prefix: str = "") -> Iterator[tuple[str, os.DirEntry[str]]]:
     """Yield all that is below ``folder``, each with its path relative to it; links are not followed."""
-    with os.scandir(folder / prefix) as things:
+    with os.scandir(f"{folder}/{prefix}") as things:  # many small files: building paths would take most of the time
         for thing in things:
             yield f"{prefix}{thing.name}", thing
             if thing.is_dir(follow_symlinks=False):

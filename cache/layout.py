@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from semidense.cache.errors import CacheUnavailable, InvalidKey
-from semidense.cache.files import is_folder, make_folder, reading, writing
+from semidense.cache.files import is_folder, make_folder, reading, require_no_link, writing
 
 _KEY = re.compile(r"[0-9a-f]{64}", re.ASCII)
 _LEASE = "[0-9a-f]{32}"
@@ -164,6 +164,8 @@ class Layout:
                 self._write_tag()
             for folder in ("records", "entries", "drafts", "quarantine", "locks", "leases"):
                 make_folder(self.root / folder)
+            for folder in ("sources", "checkpoints"):  # made when they are needed
+                require_no_link(self.root / folder)
 
     def _is_tagged(self) -> bool:
         tag = self.root / _TAG_NAME

@@ -3,7 +3,6 @@
 Everywhere a disparity ``d`` belongs to a pixel of the LEFT view unless said otherwise, and ``x_right = x_left - d``.
 """
 
-import hashlib
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
@@ -14,7 +13,8 @@ from typing import Any, Literal, Protocol, TypeAlias, cast
 import numpy as np
 
 from semidense.datasets.arrays import DisparityMap, ImageArray, Mask
-from semidense.datasets.errors import DatasetError, MissingFileError
+from semidense.datasets.errors import DatasetError
+from semidense.datasets.exact_files import exact_files, file_digest
 
 Split: TypeAlias = Literal["train", "test"]
 RangeEnd: TypeAlias = Literal["minimum", "maximum"]
@@ -187,6 +187,7 @@ class SceneSource:
         open_ends: The ends of ``disparities`` that nobody knows: those hold the widest that the image allows, until
             somebody estimates them.
         warnings: What looks wrong with the files, a line each.
+        digests: Role to the sha256 of the bytes that its file must have, in hex; a role without one is not checked.
     """
 
     name: str
@@ -201,6 +202,7 @@ class SceneSource:
     calibration: Calibration | None = None
     open_ends: tuple[RangeEnd, ...] = ()
     warnings: tuple[str, ...] = field(default=(), hash=False)
+    digests: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     def load(self) -> Scene:
         """Read images and truth.
@@ -213,7 +215,8 @@ class SceneSource:
 
     def load_images(self) -> tuple[ImageArray, ImageArray]:
         """Read the left and the right view only; raises what `load` raises."""
-        left, right = self._reader().read_images(self.files, self.parameters)
+        with exact_files(self.files, self.digests) as files:
+            left, right = self._reader().read_images(files, self.parameters)
         Scene(self.name, left, right, None, self.disparities)
         self._check_size("images", left)
         return left, right
@@ -222,7 +225,8 @@ class SceneSource:
         """Read the ground truth only, None where there is none; raises what `load` raises."""
         if not self.has_truth:
             return None
-        truth = self._reader().read_truth(self.files, self.parameters)
+        with exact_files(self.files, self.digests) as files:
+            truth = self._reader().read_truth(files, self.parameters)
         self._check_size("truth", truth.disparity)
         return truth
 
@@ -239,7 +243,7 @@ class SceneSource:
             MissingFileError: If a file cannot be read.
         """
         chosen = sorted(role for role in self.files if roles is None or role in roles)
-        digests = {role: _sha256(self.files[role]) for role in chosen}
+        digests = {role: file_digest(self.files[role]) for role in chosen}
         return {"reader": self.reader, "files": digests, "parameters": dict(self.parameters)}
 
     def image_identity(self) -> dict[str, Any]:
@@ -259,14 +263,6 @@ class SceneSource:
             raise DatasetError(
                 f"{self.name}: {what} of {_size(array)}, but {rows} x {columns} was listed; list it again"
             )
-
-
-def _sha256(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise MissingFileError(f"{path}: cannot be read ({error.strerror})") from error
 
 
 def _size(array: np.ndarray[Any, Any]) -> str:

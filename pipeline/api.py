@@ -14,7 +14,7 @@ from semidense.datasets import Dataset, SceneSource, open_dataset
 from semidense.pipeline.execution.retry import attempt
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.execution.watch import Unwatched, Watch
-from semidense.pipeline.plan.config import Config, Settings, alternatives, setting_texts, value_text
+from semidense.pipeline.plan.config import Config, Settings, alternatives, setting_texts, shortened, value_text
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made, Plan, Planned, make_plan
 from semidense.pipeline.plan.presets import DEFAULT
@@ -248,11 +248,11 @@ def parse_thresholds(R: str | float | Sequence[float]) -> list[float]:
         R = [R] if isinstance(R, int | float) else R
         values = _span(R) if isinstance(R, str) and ":" in R else _list(R)
     except ValueError:
-        raise UsageError(f"R = {R!r}: write a number, numbers with commas, or first:last:step") from None
+        raise UsageError(f"R = {shortened(R)}: write a number, numbers with commas, or first:last:step") from None
     outside = [value for value in values if not 0 <= value <= 1]
     if outside or not values:
         raise UsageError(
-            f"R = {R!r}: every threshold must lie in [0, 1]" + (f", not {outside[0]:g}" if outside else "")
+            f"R = {shortened(R)}: every threshold must lie in [0, 1]" + (f", not {outside[0]:g}" if outside else "")
         )
     return values
 

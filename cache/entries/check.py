@@ -137,9 +137,9 @@ def _compare_bytes(folder: Path, manifest: Manifest, remember: bool) -> None:
     """Compare each file's hash with the manifest."""
 
     def differs(file: File) -> bool:
-        return _hash(folder / file.path, remember) != file.sha256
+        return _hash(f"{folder}/{file.path}", remember) != file.sha256
 
-    unknown = [file for file in manifest.files if not (remember and _known(folder / file.path) == file.sha256)]
+    unknown = [file for file in manifest.files if not (remember and _known(f"{folder}/{file.path}") == file.sha256)]
     small = sum(file.size for file in unknown) < THREADS_PAY
     for file, wrong in zip(unknown, map(differs, unknown) if small else in_threads(differs, unknown), strict=True):
         if wrong:
@@ -151,27 +151,27 @@ def forget() -> None:
     _hashed.clear()
 
 
-def _hash(path: Path, remember: bool) -> str | None:
+def _hash(path: str, remember: bool) -> str | None:
     """Return a file's sha256, and keep it if a later change of the file is sure to show; None if the disk fails."""
     before, now = _fingerprint(path), time.time()
     try:
-        sha256 = hash_file(path)
+        sha256 = hash_file(Path(path))
     except OSError as error:
         if error.errno == errno.EIO:
             return None
         raise
     if remember and _fingerprint(path) == before and now - max(before[1], before[2]) / 1e9 > SETTLED:
-        _hashed[str(path)] = (before, sha256)
+        _hashed[path] = (before, sha256)
     return sha256
 
 
-def _known(path: Path) -> str | None:
+def _known(path: str) -> str | None:
     """Return the hash that was worked out earlier for this very file, unchanged since."""
-    known = _hashed.get(str(path))
+    known = _hashed.get(path)
     return known[1] if known and known[0] == _fingerprint(path) else None
 
 
-def _fingerprint(path: Path) -> _Print:
+def _fingerprint(path: str) -> _Print:
     """Return what changes with a file: size, both times, inode and device."""
-    status = path.lstat()
+    status = os.lstat(path)
     return status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino, status.st_dev

@@ -162,7 +162,8 @@ def _require_same(old: Entry, new: Entry) -> None:
 def _suspicion(old: object, new: object) -> str:
     """Return what to look for, given the CPUs that two results were made on."""
     if old != new:
-        return f"the first was made on {old}, the second on {new}, which may round otherwise"
+        names = [str(cpu or "an unknown CPU") for cpu in (old, new)]
+        return f"the first was made on {names[0]}, the second on {names[1]}, which may round otherwise"
     return "find what its key lacks, or what is random in it"
 
 

@@ -11,9 +11,7 @@ file changed since this process began is refused.
 
 import ast
 import hashlib
-import os
 import sys
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -23,6 +21,7 @@ from typing import TypeGuard
 
 from semidense.cache.document import digest
 from semidense.cache.errors import EditedSource, SourceNotFound
+from semidense.cache.keys.imported import Stamp, process_start, stamp_of
 
 
 @dataclass(frozen=True)
@@ -113,7 +112,7 @@ def require_imported_as_hashed(modules: Iterable[str]) -> None:
         located = _locate(name)
         if located and located.file:
             known = _read(located)
-            if _stamp(located.file) != known.stamp and source_hash(located.file.read_bytes()) != known.hash:
+            if stamp_of(located.file) != known.stamp and source_hash(located.file.read_bytes()) != known.hash:
                 raise EditedSource(_edited(located.file))
         _settled.add(name)
 
@@ -178,7 +177,6 @@ def _locate_by_import_system(name: str) -> _Module | None:
     return _Module(name, file, folders) if file or folders else None
 
 
-_Stamp = tuple[int, int, int]
 _settled: set[str] = set()
 """Modules that are known to run the text that was hashed; what happens to their files does not matter any more."""
 
@@ -190,19 +188,19 @@ class _Source:
     hash: str
     imports: frozenset[str]
     text: str
-    stamp: _Stamp
+    stamp: Stamp
 
 
 @cache
 def _read(module: _Module) -> _Source:
     file, is_imported = module.file or Path(), module.name in sys.modules
     try:
-        stamp, data = _stamp(file), file.read_bytes()
+        stamp, data = stamp_of(file), file.read_bytes()
         imports, hashed = frozenset(_imports(ast.parse(data), module)), source_hash(data)
     except (OSError, SyntaxError, ValueError, RecursionError) as error:
         raise SourceNotFound(f"cannot read the source {module.file}: {error}") from error
     if is_imported:
-        if file.stat().st_ctime > _process_start() + _TICK:
+        if file.stat().st_ctime > process_start():
             raise EditedSource(_edited(file))
         _settled.add(module.name)
     return _Source(hashed, imports, data.decode("utf-8", "replace"), stamp)
@@ -210,26 +208,6 @@ def _read(module: _Module) -> _Source:
 
 def _edited(file: Path) -> str:
     return f"{file} was edited since this Python began, and may have been imported before: restart Python (the kernel)"
-
-
-def _stamp(file: Path) -> _Stamp:
-    status = file.stat()
-    return status.st_ctime_ns, status.st_size, status.st_ino
-
-
-_TICK = 0.02
-"""Seconds: the kernel tells a process's start to 0.01 s, and no import happens so soon after it."""
-_IMPORTED = time.time()
-
-
-@cache
-def _process_start() -> float:
-    """Return when this process began, in seconds since the epoch; where that is not told, when this was imported."""
-    try:
-        ticks = int(Path("/proc/self/stat").read_text(errors="replace").rpartition(")")[2].split()[19])
-        return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME) + ticks / os.sysconf("SC_CLK_TCK")
-    except (OSError, AttributeError):
-        return _IMPORTED
 
 
 class _Bare(ast.NodeTransformer):

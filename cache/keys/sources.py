@@ -43,8 +43,11 @@ def keep_sources(layout: Layout, code: Mapping[str, str]) -> None:
 
     What cannot be kept is left out: only explanations need it.
     """
+    with suppress(CacheError):
+        layout.create()
     for module, code_hash in code.items():
         with suppress(CacheError, OSError):
+            layout.require_cache()
             path = layout.source(code_hash)
             if path.exists() or (text := source_text(module)) is None or source_hash(text) != code_hash:
                 continue

@@ -85,9 +85,9 @@ def _about_floats(array: NDArray[Any]) -> str:
 
 
 def _in_16_bits(what: str, array: NDArray[Any]) -> ImageArray:
-    """Return integers of any kind as uint8 or uint16 in this machine's byte order, with their values."""
+    """Return integers of any kind as uint8 or uint16 in this machine's byte order, with their values, as a copy."""
     if array.dtype == np.uint8:
-        eight: ImageArray = array.astype(np.uint8, copy=False)
+        eight: ImageArray = array.astype(np.uint8)
         return eight
     low, high = (int(array.min()), int(array.max())) if array.size else (0, 0)
     if low < 0 or high > np.iinfo(np.uint16).max:

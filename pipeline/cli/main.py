@@ -1,7 +1,9 @@
 """The command line. Nothing heavy is imported before a command runs: ``--help`` must answer at once."""
 
+import os
 import signal
 import sys
+from contextlib import suppress
 from typing import Annotated, Any
 
 import typer
@@ -51,25 +53,39 @@ def _stop(number: int, _: Any) -> None:  # noqa: ANN401
 
 def main() -> None:
     """Run the command line; a user's mistake is one line and exit code 2."""
+    _require_streams()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)
     try:
-        app(prog_name="pipeline")
+        try:
+            app(prog_name="pipeline")
+        finally:
+            sys.stdout.flush()  # what does not fit on a full disk is an error here, and not a word after the end
     except _Stopped as stop:
         _leave(128 + int(stop.args[0]))
     except Exception as error:
-        from semidense.pipeline.plan.errors import USER_ERRORS
+        from semidense.pipeline.plan.errors import told
 
-        if not isinstance(error, USER_ERRORS):
+        if (line := told(error)) is None:
             raise
-        print(f"pipeline: {error}", file=sys.stderr)
+        print(f"pipeline: {line}", file=sys.stderr)
+        if isinstance(error, OSError) and error.filename is None:
+            _leave(2)  # the end of Python would try to write again, and say so at length
         raise SystemExit(2) from None
+
+
+def _require_streams() -> None:
+    """See to it that messages have somewhere to go, and refuse to work where results have not."""
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115, PTH123 - it takes the place of the closed one, for good
+    if sys.stdout is None:
+        print("pipeline: standard output is closed: results have nowhere to go", file=sys.stderr)
+        raise SystemExit(2)
 
 
 def _leave(code: int) -> None:
     """Exit at once: drafts are deleted by now, and tasks that still compute have nothing left to write to."""
-    import os
-
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):
+            stream.flush()
     os._exit(code)

@@ -1,18 +1,15 @@
 """What a comparison leaves: tables, ``comparison.csv``, ``comparison.json``, and figures."""
 
-import csv
-import io
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from semidense.datasets.formats.atomic import atomic_write
 from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.figures import density_figure, dots_figure, sheets
-from semidense.pipeline.comparison.rows import Row
 from semidense.pipeline.comparison.tables import THRESHOLD, TITLES, at, of, quoted
-from semidense.pipeline.files.writing import explaining, save_png, writable_folder
+from semidense.pipeline.files.writing import explaining, save_png, table_text, writable_folder
 from semidense.pipeline.results.metric_rows import FIGURES
 
 COLUMNS = ("experiment", "scene", "method", "mask", "threshold_px", "R", *FIGURES, "quoted", "data")
@@ -52,7 +49,7 @@ def write_comparison(found: Comparison, folder: Path, threshold: float = THRESHO
     for name, drawn in _figures(found, threshold).items():
         save_png(drawn, folder / name)
         written.append(folder / name)
-    _write(written[0], _csv([*found.rows, *found.means, *quoted(found)]))
+    _write(written[0], table_text([*found.rows, *found.means, *quoted(found)], COLUMNS))
     _write(written[1], json.dumps(as_json(found, written), allow_nan=False, indent=1))
     return written
 
@@ -60,14 +57,6 @@ def write_comparison(found: Comparison, folder: Path, threshold: float = THRESHO
 def _write(path: Path, text: str) -> None:
     with explaining(path), atomic_write(path) as file:
         file.write(text.encode())
-
-
-def _csv(rows: Sequence[Row]) -> str:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, extrasaction="raise", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
 
 
 def _figures(found: Comparison, threshold: float) -> dict[str, Any]:

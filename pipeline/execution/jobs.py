@@ -10,7 +10,7 @@ from semidense.pipeline.execution.claims import Claims
 from semidense.pipeline.execution.proof import require_same
 from semidense.pipeline.execution.recent_inputs import Recent
 from semidense.pipeline.execution.watch import Watch
-from semidense.pipeline.plan.errors import DISK_ERRNOS, USER_ERRORS, StageFailed, StageRefused
+from semidense.pipeline.plan.errors import StageFailed, StageRefused, told_of_stage
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.steps import Step
 
@@ -74,6 +74,6 @@ def explained(step: Step, where: str = "") -> Iterator[None]:
         raise
     except Exception as error:
         place = f"{step.name}, {where}" if where else step.name
-        message = f"{place}: {error}" if str(error) else f"{place}: {type(error).__name__}"
-        disk = isinstance(error, OSError) and error.errno in DISK_ERRNOS
-        raise (StageRefused if disk or isinstance(error, USER_ERRORS) else StageFailed)(message) from error
+        if line := told_of_stage(error):
+            raise StageRefused(f"{place}: {line}") from error
+        raise StageFailed(f"{place}: {error}" if str(error) else f"{place}: {type(error).__name__}") from error

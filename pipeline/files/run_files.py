@@ -16,8 +16,6 @@
 Where the variants of a sweep differ in a file's content, the settings that it depends on are in its name.
 """
 
-import csv
-import io
 import json
 import sys
 from collections.abc import Mapping, Sequence
@@ -33,7 +31,7 @@ from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.figures.colours import confidence_rgb, disparity_rgb, disparity_span
 from semidense.pipeline.files.file_names import safe_names
 from semidense.pipeline.files.selection import Wanted, wanted
-from semidense.pipeline.files.writing import explaining, save_png, writable_folder, write_rgb
+from semidense.pipeline.files.writing import explaining, save_png, table_text, writable_folder, write_rgb
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.results.metric_rows import SWEEP_THRESHOLD
 from semidense.pipeline.results.provenance import lineage
@@ -187,12 +185,8 @@ def write_rows(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     """
     named = {tuple(row.get(name) for name in COLUMNS[:5]) for row in rows}
     columns = COLUMNS if len(named) == len(rows) else (*COLUMNS, "variant")
-    text = io.StringIO()
-    writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
     with explaining(path), atomic_write(path) as file:
-        file.write(text.getvalue().encode())
+        file.write(table_text(rows, columns).encode())
 
 
 def write_sweep(rows: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:

@@ -1,10 +1,12 @@
 """Write files completely or not at all, and say in one line why one cannot be written."""
 
-from collections.abc import Iterator
+import csv
+import io
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,10 @@ from semidense.pipeline.plan.errors import UsageError
 
 if TYPE_CHECKING:  # an export of maps does without matplotlib's figures, which take a second to load
     from matplotlib.figure import Figure
+
+
+_FORMULA = ("=", "+", "-", "@")
+"""What makes a cell a formula to a spreadsheet."""
 
 
 @contextmanager
@@ -28,6 +34,22 @@ def explaining(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise UsageError(f"{path}: cannot be written ({error.strerror or error}); name another place") from error
+
+
+def table_text(rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> str:
+    """Return rows as CSV, other keys left out. A text that a spreadsheet would run as a formula gets a ' before it."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({name: _plain(value) for name, value in row.items()} for row in rows)
+    return text.getvalue()
+
+
+def _plain(value: object) -> object:
+    if not isinstance(value, str):
+        return value
+    text = value.replace("\r", " ")  # which would end the row
+    return f"'{text}" if text.lstrip().startswith(_FORMULA) else text
 
 
 def save_png(figure: "Figure", path: Path) -> None:

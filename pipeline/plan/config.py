@@ -28,6 +28,11 @@ _VALUE = re.compile(r'(?:\[[^\]]*\]|"[^"]*"|[^,])+')
 CHOICES = ("weights", "use")
 """Sections with a field a product, each empty by default."""
 
+LONGEST_FILE = 1 << 20
+"""Bytes of a configuration; no real one comes near."""
+LONGEST_VALUE = 200
+"""Characters of a value that a message repeats."""
+
 
 class TrainingParams(Params):
     """What is trained, and on what. In no key: the scenes and networks themselves are, by their content."""
@@ -124,10 +129,16 @@ def _choices(name: str, products: Iterable[str]) -> type[Params]:
 
 def _read_toml(file: Path) -> dict[str, Any]:
     try:
+        if file.exists() and not (file.is_file() or file.is_dir()):  # a pipe would keep us waiting
+            raise UsageError(f"configuration {file}: it is not a plain file")
+        if file.stat().st_size > LONGEST_FILE:
+            raise UsageError(f"configuration {file}: it has more than {LONGEST_FILE:,} bytes; is it the right file?")
         return tomllib.loads(file.read_text())
     except RecursionError:
         raise UsageError(f"configuration {file}: it is nested too deeply") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except UsageError:
+        raise
+    except (OSError, ValueError) as error:  # of a number with too many digits, a plain ValueError
         raise UsageError(f"configuration {file}: {getattr(error, 'strerror', None) or error}") from None
 
 
@@ -214,7 +225,7 @@ def parse_value(text: str, several: bool = True) -> object:
     """Return what a setting's text means: JSON where it is JSON, else the text; of ``several``, its parts at commas."""
     try:
         return json.loads(text)
-    except (json.JSONDecodeError, RecursionError):
+    except (ValueError, RecursionError):  # a number with too many digits is a plain ValueError
         return text.split(",") if several and "," in text else text
 
 
@@ -257,4 +268,10 @@ def one_line(error: ValidationError) -> str:
     first = error.errors(include_url=False)[0]
     name = ".".join(str(part) for part in first["loc"])
     more = f" ({error.error_count() - 1} more)" if error.error_count() > 1 else ""
-    return f"configuration: {name} = {first['input']!r}: {first['msg']}{more}"
+    return f"configuration: {name} = {shortened(first['input'])}: {first['msg']}{more}"
+
+
+def shortened(value: object) -> str:
+    """Return a value as a message repeats it, the start of a very long one."""
+    text = repr(value)
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}… ({len(text):,} characters)"

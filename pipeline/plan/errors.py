@@ -23,8 +23,39 @@ class StageRefused(UsageError):  # noqa: N818
     """A stage refused what it was given; the message names product, scene, tile and reason."""
 
 
-DISK_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EFBIG})
-"""Of an ``OSError``: what a disk did, in whatever code it was noticed."""
-
 USER_ERRORS = (UsageError, DatasetError, CacheError, StageError)
 """Errors that one line explains: the command line prints it and exits with 2."""
+
+_MACHINE_ERRNOS = frozenset(
+    {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EFBIG, errno.EMFILE, errno.ENFILE, errno.ENOMEM}
+)
+_NO_MEMORY = ("allocate memory", "can't start new thread", "failed to map segment", "Cannot allocate")
+"""What torch, Python's threads and the loader of libraries say for want of memory."""
+
+
+def told(error: BaseException) -> str | None:
+    """Return one line for what the user or the machine is to mend; None for a fault of the program."""
+    if isinstance(error, USER_ERRORS):
+        return str(error)
+    if _lacks_memory(error):
+        return "there is not enough memory: raise its limit (ulimit -v), use fewer --workers, or smaller images"
+    if isinstance(error, OSError):
+        reason = error.strerror or str(error)
+        more = "; raise the limit on open files (ulimit -n)" if error.errno == errno.EMFILE else ""
+        return f"{error.filename or 'standard output'}: {reason}{more}"
+    return None
+
+
+def told_of_stage(error: Exception) -> str | None:
+    """Return one line for what a stage could not do for want of the user's or the machine's; None for its own fault."""
+    machine = isinstance(error, OSError) and error.errno in _MACHINE_ERRNOS
+    return told(error) if isinstance(error, USER_ERRORS) or machine or _lacks_memory(error) else None
+
+
+def _lacks_memory(error: BaseException | None) -> bool:
+    """Return whether an error, or what it came from, says so."""
+    while error is not None:
+        if isinstance(error, MemoryError) or any(words in str(error) for words in _NO_MEMORY):
+            return True
+        error = error.__cause__ or error.__context__
+    return False

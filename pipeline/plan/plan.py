@@ -17,6 +17,8 @@ from semidense.pipeline.plan.environment import former_version, version
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.steps import Graph, Request, Step, build, products
 
+COMPARED = 50
+"""Earlier results of a product and scene that a step is compared with, the newest: a sweep leaves thousands."""
 State = Literal["hit", "made", "stale", "missing"]
 
 
@@ -179,7 +181,7 @@ class _Planner:
             self._reasons = Causes(self.store, entries)
             for entry in entries:
                 self._history.setdefault(tuple(sorted(entry.label.items())), []).append(entry)
-        return self._history.get(tuple(sorted(step.label.items())), [])
+        return self._history.get(tuple(sorted(step.label.items())), [])[:COMPARED]
 
 
 def _fewest(candidates: list[list[Change]]) -> tuple[Change, ...]:

@@ -20,9 +20,9 @@ def resolved(params: Params, scene: SceneSource | None) -> Params:
     if hasattr(params, "precision"):
         update["precision"] = resolve(params.precision, transformed=getattr(params, "transformed", False))
     if scene and getattr(params, "d_min", 0) is None:
-        update["d_min"] = scene.disparities.minimum
+        update["d_min"] = max(scene.disparities.minimum, 1 - scene.size[1])
     if scene and getattr(params, "d_max", 0) is None:
-        update["d_max"] = scene.disparities.maximum
+        update["d_max"] = min(scene.disparities.maximum, scene.size[1] - 1)  # a file may claim any number
     try:
         return type(params).model_validate(dict(params) | update)
     except ValidationError as error:

@@ -190,7 +190,7 @@ def _targets(builder: "_Builder", trained_on: Sequence[Mapping[str, Any]]) -> It
         yield builder.product(upto, None)
         return
     for scene in builder.request.dataset.scenes:
-        if scene.image_identity() in trained_on:
+        if trained_on and scene.image_identity() in trained_on:
             notes.append(f"{scene.name} is a training scene: it is left out, since nothing is tested on it")
         elif not scene.has_truth and "truth" in made_from(upto):
             notes.append(f"{scene.name} has no ground truth: no {upto} can be made for it")
@@ -312,7 +312,9 @@ class _Builder:
         return replace(self, config=config)._add_stage(stage, params, None, inputs)
 
     def _add_source(self, source: Source, scene: SceneSource) -> str:
-        return self._add(source.stage, scene, scene, source.identity(scene), {}, scene.reader)
+        identity = source.identity(scene)
+        known = replace(scene, digests=identity["files"])  # what is read must be what the key names
+        return self._add(source.stage, scene, known, identity, {}, scene.reader)
 
     def _add_stage(
         self, stage: Stage, params: Params, scene: SceneSource | None, inputs: Mapping[str, tuple[str, ...]]

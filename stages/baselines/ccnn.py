@@ -95,9 +95,9 @@ class OfNetwork(TypedDict):
     ccnn_net: Network
 
 
+@one_thread()
 def compute_ccnn(_: NoParams, inputs: OfNetwork) -> Scored:
     """Compute the product ``ccnn`` of a block that brings 4 px of context on every side."""
-    one_thread()
     net = Ccnn()
     from_vector(net, inputs["ccnn_net"]["parameters"])
     net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]

@@ -53,6 +53,7 @@ def compute_mc_cnn(params: CheckedParams, inputs: OfImages) -> Matched:
     return match_windows(costs, left.shape, disparities, 1, params.tolerance)
 
 
+@one_thread()
 def compute_mc_cnn_accurate(params: CheckedParams, inputs: OfImages) -> Matched:
     """Compute a tile of the product ``mc_cnn_accurate``: as ``mc_cnn``, by the network that joins the two views."""
     from mc_cnn.model.mc_cnn_accurate import AccMcCnnInfer
@@ -60,7 +61,6 @@ def compute_mc_cnn_accurate(params: CheckedParams, inputs: OfImages) -> Matched:
     weights = str(resources.files("mc_cnn") / "weights" / _ACCURATE)
     net = AccMcCnnInfer()
     net.load_state_dict(torch.load(weights, map_location="cpu", weights_only=True)["model"])
-    one_thread()
     images = inputs["images"]
     with torch.inference_mode():
         left, right = (

@@ -48,7 +48,10 @@ def match_semi_global(
         mode=cv2.STEREO_SGBM_MODE_HH,
     )
     found = matcher.compute(left, right)[:, margin : left.shape[1] - margin].astype(np.float32) / _UNITS
-    return np.where(found < disparities[0], np.float32(np.nan), found)
+    found = np.where(found < disparities[0], np.float32(np.nan), found)
+    if checked:
+        return np.where(found > disparities[-1], np.float32(np.nan), found)
+    return np.minimum(found, np.float32(disparities[-1]))  # OpenCV searches whole sixteens, beyond our range
 
 
 def compute_sgm(params: SgmParams, inputs: OfImages) -> Matched:

@@ -1,8 +1,25 @@
 """How many threads an operation of torch has: a module of its own, so that inference does not depend on training."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import torch
 
 
-def one_thread() -> None:
-    """Make torch use one thread an operation in the calling thread."""
+def keep_one_thread() -> None:
+    """Make torch use one thread an operation in the calling thread from now on: for threads of a pool of ours."""
     torch.set_num_threads(1)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Make torch use one thread an operation in the calling thread, and as many as before after that.
+
+    As a decorator, for the time of each call.
+    """
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

@@ -33,9 +33,18 @@ def fill_holes(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
     known = np.nonzero(~np.isnan(rows).any(axis=1))[0]
     if known.size == 0:
         return disparity.copy()
-    nearest = known[np.abs(known[np.newaxis] - np.arange(len(rows))[:, np.newaxis]).argmin(axis=1)]
-    filled: NDArray[np.float32] = rows[nearest]
+    filled: NDArray[np.float32] = rows[_nearest(known, np.arange(len(rows)))]
     return filled
+
+
+def _nearest(known: NDArray[np.intp], wanted: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the nearest of some sorted numbers to each number; of two the smaller."""
+    after = np.searchsorted(known, wanted).clip(max=len(known) - 1)
+    before = (after - 1).clip(min=0)
+    nearest: NDArray[np.intp] = np.where(
+        wanted - known[before] <= np.abs(known[after] - wanted), known[before], known[after]
+    )
+    return nearest
 
 
 def _carried(disparity: NDArray[np.float32]) -> NDArray[np.float32]:

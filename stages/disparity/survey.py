@@ -167,8 +167,15 @@ def _agreed(good: NDArray[np.bool_], disparity: NDArray[np.intp], row: NDArray[n
     support = np.zeros(good.size, int)
     for offset in _NEIGHBOURS:
         alike = np.abs(np.roll(disparity, offset) - disparity) <= 1
-        support += np.roll(good, offset) & alike & (np.abs(np.roll(row, offset) - row) <= 1)
+        near = np.abs(np.roll(row, offset) - row) <= 1
+        support += np.roll(good, offset) & alike & near & _has_neighbour(good.size, offset)
     return support >= _AGREEING
+
+
+def _has_neighbour(count: int, offset: int) -> NDArray[np.bool_]:
+    """Return for each patch whether there is one so many places before it: the row does not go round."""
+    place = np.arange(count) - offset
+    return (place >= 0) & (place < count)
 
 
 class Surveyed(TypedDict):

@@ -35,12 +35,12 @@ def confidence(
     return sigmoid(padded_log_odds(net, np.pad(layers, margin, mode="edge"), precision, flipped))
 
 
+@one_thread()
 def padded_log_odds(
     net: EvaluationNet, layers: NDArray[np.float32], precision: Precision = "float32", flipped: bool = False
 ) -> NDArray[np.float32]:
     """Return the log-odds of ``confidence``, of layers (layer, y + 100, x + 100) with 50 px of context all round."""
     keep_freed_memory()
-    one_thread()
     with torch.inference_mode(), autocast(precision):
         maps = torch.from_numpy(np.ascontiguousarray(layers)).unsqueeze(0)
         log_odds = net.dense(maps.contiguous(memory_format=torch.channels_last))

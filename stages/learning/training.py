@@ -18,7 +18,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from semidense.stages.compute.allocator import keep_freed_memory
-from semidense.stages.compute.threads import one_thread
+from semidense.stages.compute.threads import keep_one_thread
 from semidense.stages.learning.optimiser import optimisers_of
 from semidense.stages.learning.schedule import SHARDS, Schedule
 from semidense.stages.stage import Monitor, StageError
@@ -60,7 +60,7 @@ def fit(net: nn.Module, loss: Loss, schedule: Schedule, monitor: Monitor) -> NDA
     parameters = list(net.parameters())
     optimisers = optimisers_of(net, schedule)
     curve = _resume(net, optimisers, monitor.load())
-    with ThreadPoolExecutor(SHARDS, initializer=one_thread) as pool:
+    with ThreadPoolExecutor(SHARDS, initializer=keep_one_thread) as pool:
         for step in range(len(curve), schedule.steps):
             value, gradients = _gradients(parameters, loss, step, pool)
             curve.append(value)

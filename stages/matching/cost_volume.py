@@ -64,6 +64,7 @@ def cost_volume(
     return padded_cost_volume(net, np.pad(channels, margin, mode="edge"), disparities, precision)
 
 
+@one_thread()
 def padded_cost_volume(
     net: MatchingNet,
     channels: NDArray[np.float32],
@@ -79,7 +80,6 @@ def padded_cost_volume(
     height, width = (length - 2 * RADIUS for length in channels.shape[2:])
     volume = np.full((height, width, len(disparities)), np.nan, np.float32)
     keep_freed_memory()
-    one_thread()
     with torch.inference_mode():
         views = torch.from_numpy(np.ascontiguousarray(channels))
         costs = (_transformed if is_transformable(net) else _direct)(net, views, precision)

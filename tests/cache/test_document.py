@@ -1,3 +1,4 @@
+import json
 import math
 from typing import Any
 
@@ -5,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semidense.cache.document import canonical, digest, parse, seal, unseal
+from semidense.cache.document import canonical, digest, laid_out, parse, seal, unseal
 from semidense.cache.errors import InvalidRecipe
 
 scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text()
@@ -126,3 +127,9 @@ def test_unseal_refuses(data: bytes, message: str) -> None:
 def test_digest_is_the_sha256_of_the_text() -> None:
     # printf '{"a":1}' | sha256sum
     assert digest({"a": 1}) == "015abd7f5cc57a2dd94b7590f04ad8084273905ee33ec5cebeae62276a97f862"
+
+
+@settings(max_examples=100, deadline=None)
+@given(trees)
+def test_documents_are_laid_out_as_the_standard_library_does(value: object) -> None:
+    assert laid_out(canonical(value)) == json.dumps(value, sort_keys=True, indent=1)

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tests.faults import inputs, keys, machine, processes, storage, workers
+from tests.faults import inputs, keys, machine, processes, storage
+from tests.faults.runs import changes, mistakes, workers
 from tests.faults.tally import Tally
 
 PROMISED = 5000
@@ -42,7 +43,17 @@ ROWS = (
     Row(11, "bad images", inputs.bad_images, 0.1),
     Row(12, "bad maps, calibrations, configurations, weights, archives", inputs.bad_files, 0.1),
     Row(13, "workers with other code than the run", workers.other_code, 0.2),
+    Row(14, "input files replaced between planning and reading, and put back", changes.replaced_inputs, 0.5),
+    Row(15, "modules edited around their import", changes.edited_modules, 0.5),
     Row(16, "workers and schedulers killed during a run on a cluster", workers.killed_workers, 0.05),
+    Row(17, "sweeping and cleaning beside living runs that no process id tells of", changes.living_runs, 0.2),
+    Row(18, "folders, files and links of the user's own in the cache's place", changes.folders_of_others, 1),
+    Row(19, "URLs as caches", changes.urls, 1),
+    Row(20, "pipes and devices in place of files", mistakes.pipes, 1),
+    Row(21, "mistakes on the command line, streams that are full or closed, too little memory", mistakes.commands, 0.5),
+    Row(22, "calibrations that claim absurd ranges", mistakes.absurd_ranges, 1),
+    Row(23, "records of a sweep", changes.records_of_a_sweep, 0.2),
+    Row(24, "another CPU, and a result that differs", changes.other_cpus, 1),
 )
 COLUMNS = ("injected", "wrong", "lost", "leftovers", "tracebacks")
 HEADINGS = ("faults", "wrong results", "lost products", "leftovers", "tracebacks")

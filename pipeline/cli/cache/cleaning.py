@@ -1,14 +1,14 @@
 """Clean a cache: show what can go and why, and delete it when asked to."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from rich.markup import escape
 from rich.table import Table
 
-from semidense.cache import Store
+from semidense.cache import Entry, Store
 from semidense.cache.upkeep.gc import Item, Limits, Survey, collect, survey
 from semidense.pipeline.api import Task, open_store, status
 from semidense.pipeline.cli.console import print_json
@@ -49,11 +49,14 @@ class Wish:
 
     def _reached(self, folder: Path | None) -> Iterator[str]:
         """Yield the keys that the datasets reach, each with each configuration."""
-        store = open_store(folder)
+        by_label: dict[tuple[tuple[str, str], ...], list[Entry]] = {}
+        for entry in open_store(folder).entries():
+            by_label.setdefault(tuple(sorted(entry.label.items())), []).append(entry)
         for dataset in self.keep:
             for config in self.configs or (None,):
                 for planned in status(Task(dataset, config=config, train=self.train, cache=folder)).steps:
-                    yield from [planned.key] if planned.key else _possible(store, planned)
+                    same_label = by_label.get(tuple(sorted(planned.step.label.items())), ())
+                    yield from [planned.key] if planned.key else _possible(same_label, planned)
 
 
 def _useless(store: Store) -> dict[str, str]:
@@ -62,10 +65,10 @@ def _useless(store: Store) -> dict[str, str]:
     return {key: f"made by version {version}, whose code is gone" for key, version in versions.items() if version}
 
 
-def _possible(store: Store, planned: Planned) -> Iterator[str]:
+def _possible(entries: Iterable[Entry], planned: Planned) -> Iterator[str]:
     """Yield the entries that a step may turn out to be, while what it is made from is not there."""
     step = planned.step
-    for entry in store.history(step.label):
+    for entry in entries:
         same = (entry.recipe.code, entry.recipe.params, entry.recipe.environment)
         if same == (step.code, step.settings, step.environment):
             yield entry.key

@@ -44,6 +44,7 @@ def fast_cost_volume(
     return padded_fast_costs(net, np.pad(channels, margin, mode="edge"), disparities, precision)
 
 
+@one_thread()
 def padded_fast_costs(
     net: DescriptorNet, channels: NDArray[np.float32], disparities: range, precision: Precision = "float32"
 ) -> NDArray[np.float32]:
@@ -53,7 +54,6 @@ def padded_fast_costs(
     height, width = (length - 2 * REACH for length in channels.shape[2:])
     volume = np.empty((height, width, len(disparities)), np.float32)
     keep_freed_memory()
-    one_thread()
     with torch.inference_mode():
         left, right = _descriptors(net, torch.from_numpy(np.ascontiguousarray(channels)), precision)
         smallest, largest = disparities[0], disparities[-1]

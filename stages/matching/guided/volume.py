@@ -27,6 +27,7 @@ COLUMNS = 64
 """Columns of tiles gone through at all disparities before the next: what they meet in the views stays in the cache."""
 
 
+@one_thread()
 def padded_guided_costs(
     net: MatchingNet,
     descriptor_net: DescriptorNet,
@@ -60,7 +61,6 @@ def padded_guided_costs(
     volume = np.full((*(TILE * count for count in chosen.shape[:2]), len(disparities)), np.nan, np.float32)
     tiles = volume.reshape(chosen.shape[0], TILE, chosen.shape[1], TILE, len(disparities))
     keep_freed_memory()
-    one_thread()
     with torch.inference_mode():
         own = slice(MARGIN - RADIUS, RADIUS - MARGIN)
         judge = judge_tiles(net, torch.from_numpy(np.ascontiguousarray(channels[:, :, own, own])), precision)

@@ -1,3 +1,5 @@
+import csv
+import io
 from pathlib import Path
 
 import numpy as np
@@ -5,7 +7,7 @@ import pytest
 from PIL import Image
 
 from semidense.pipeline.figures.drawing import new_figure
-from semidense.pipeline.files.writing import save_png, write_rgb
+from semidense.pipeline.files.writing import save_png, table_text, write_rgb
 from semidense.pipeline.plan.errors import UsageError
 
 
@@ -36,3 +38,13 @@ def test_a_place_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"file/a\.png: cannot be written \(Not a directory\)") as refused:
         save_png(new_figure("any"), tmp_path / "file" / "a.png")
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("name", ["=1+1", "+1", "-x", "@cell", "\t=1", "\r=1"])
+def test_no_cell_is_a_formula_to_a_spreadsheet(name: str) -> None:
+    (_, row) = csv.reader(io.StringIO(table_text([{"scene": name, "R": -0.5, "more": 1}], ("scene", "R")), newline=""))
+    assert row == [f"'{name}".replace("\r", " "), "-0.5"]
+
+
+def test_other_texts_stay_as_they_are_in_a_table() -> None:
+    assert table_text([{"scene": "Teddy", "bad": 1.5}], ("scene", "bad")) == "scene,bad\nTeddy,1.5\n"

@@ -132,3 +132,17 @@ def test_only_what_comes_with_the_extra_is_needed() -> None:
     extra = {"opencv-python-headless", "mccnn", "scikit-learn"}
     assert {name for stage in BASELINES for name in stage.needs} == extra
     assert SgmParams().p2 > SgmParams().p1
+
+
+@pytest.mark.parametrize("checked", [False, True])
+def test_sgm_finds_nothing_beyond_its_range(checked: bool) -> None:
+    """OpenCV searches whole sixteens: a true move of 8 px lies in its range, and not in one of 0 to 4 px."""
+    pytest.importorskip("cv2")
+    from semidense.stages.baselines.declaration import SgmParams
+    from semidense.stages.baselines.sgm import match_semi_global
+
+    right = np.random.default_rng(0).integers(0, 255, (40, 60), np.uint8)
+    left = np.roll(right, 8, axis=1)
+    found = match_semi_global(left, right, SgmParams(d_min=0, d_max=4), checked=checked)
+    assert np.nanmax(found, initial=0) <= 4
+    assert np.isnan(found[:, 16:]).any() == checked

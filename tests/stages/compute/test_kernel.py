@@ -60,6 +60,16 @@ HELPER = (
             "constants.py", "STEP = 1.0", "STEP = 2.0", id="a constant",
         ),
         pytest.param(
+            LOOP.replace("from made.{source} import {name}", "import made.constants\nSTEP = made.constants.STEP")
+            .format(call="STEP"),
+            "constants.py", "STEP = 1.0", "STEP = 2.0", id="a constant of an imported module",
+        ),
+        pytest.param(
+            LOOP.replace("from made.{source} import {name}", "from made import constants\nSTEP = constants.STEP")
+            .format(call="STEP"),
+            "constants.py", "STEP = 1.0", "STEP = 2.0", id="a constant of a module imported from its package",
+        ),
+        pytest.param(
             LOOP.format(source="helpers", name="helper", call="helper(i)"),
             "constants.py", "STEP = 1.0", "STEP = 2.0", id="a constant of a helper",
         ),

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from semidense.stages.disparity.survey import ENOUGH, FIELDS, SURVEY, estimate_range, survey
+from semidense.stages.disparity.survey import ENOUGH, FIELDS, SURVEY, _agreed, estimate_range, survey
 from semidense.stages.stage import NoParams
 
 
@@ -109,3 +109,11 @@ def test_the_stage_makes_what_it_declares() -> None:
     }
     assert made["left"].shape == left.shape
     assert made["equal"][0] < 0.5
+
+
+def test_the_patches_of_a_row_do_not_go_round() -> None:
+    """The last patches of the image are no neighbours of its first."""
+    alone = np.array([True, False, False, False, False, False, True, True, True])
+    alike, row = np.zeros(9, np.intp), np.zeros(9, np.intp)
+    assert not _agreed(alone, alike, row)[0]
+    assert _agreed(np.ones(9, bool), alike, row).all()

@@ -45,3 +45,31 @@ def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
 
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(UsageError, match="choose another by --port"):
         start(Store(tmp_path), taken.getsockname()[1])
+
+
+def test_it_answers_to_its_own_name_alone(tmp_path: Path) -> None:
+    """A page elsewhere can have a name of its own point at this machine."""
+    import asyncio
+    import threading
+
+    from semidense.pipeline.pages.viewer.server import start
+
+    found: dict[str, int] = {}
+
+    async def ask() -> None:
+        from tornado.httpclient import AsyncHTTPClient
+
+        server = start(Store(tmp_path / "cache"), 0)
+        try:
+            for name in ("localhost", "127.0.0.1", "evil.example", "localhost.evil.example"):
+                address = f"http://127.0.0.1:{server.port}/"
+                headers = {"Host": f"{name}:{server.port}"}
+                answer = await AsyncHTTPClient().fetch(address, headers=headers, raise_error=False)
+                found[name] = answer.code
+        finally:
+            server.stop()
+
+    thread = threading.Thread(target=lambda: asyncio.run(ask()))
+    thread.start()
+    thread.join(60)
+    assert found == {"localhost": 200, "127.0.0.1": 200, "evil.example": 403, "localhost.evil.example": 403}

@@ -20,11 +20,12 @@ from semidense.pipeline.execution import cluster as clusters
 from semidense.pipeline.execution.retry import attempt
 from semidense.pipeline.execution.watch import Unwatched
 from semidense.pipeline.plan.errors import UsageError
-from tests.faults import slow, world
+from tests.faults import world
+from tests.faults.runs import slow
 from tests.faults.tally import Tally
 from tests.tiny import TEST_ONLY
 
-PROJECT = Path(__file__).parents[2]
+PROJECT = Path(__file__).parents[3]
 SCENES = 8
 EDITS = (
     ("stages/transforms/gray.py", "semidense.stages.transforms.gray"),
