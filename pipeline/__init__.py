@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from semidense.pipeline.pairs.match import Match, match
     from semidense.pipeline.pairs.opencv import StereoMatcher
     from semidense.pipeline.plan.config import Config
-    from semidense.pipeline.results.opening import open_product
+    from semidense.pipeline.results.opening import open_product, recorded
     from semidense.pipeline.results.result import Result
     from semidense.stages.catalog import register
 
@@ -37,6 +37,7 @@ _HOMES = {
     "match": "pairs.match",
     "open_product": "results.opening",
     "open_store": "api",
+    "recorded": "results.opening",
     "register": "..stages.catalog",
     "register_dataset": "..datasets.registry",
     "report": "pages.report",
@@ -58,6 +59,7 @@ __all__ = [
     "match",
     "open_product",
     "open_store",
+    "recorded",
     "register",
     "register_dataset",
     "report",

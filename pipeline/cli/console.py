@@ -13,7 +13,7 @@ from semidense.cache.keys.recipe import short
 from semidense.pipeline.execution.scheduler import totals
 from semidense.pipeline.plan.causes import PENDING
 from semidense.pipeline.plan.plan import Made, Plan, Planned
-from semidense.pipeline.results.metric_rows import FIGURES, SWEEP_THRESHOLD, averaged, with_means
+from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, averaged, with_means
 from semidense.pipeline.results.text import results
 from semidense.stages.metrics.stage import ROW
 
@@ -112,7 +112,7 @@ def print_metrics(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -
         rows: as ``run --json`` gives them.
         masks: where the mask of each scene comes from.
     """
-    shown = with_means([row for row in rows if row["mask"] == "nonocc"])
+    shown = with_means([row for row in rows if row["mask"] == MASK])
     if shown:
         _print_rows(shown, masks)
 
@@ -151,6 +151,6 @@ def _cells(row: Mapping[str, Any]) -> list[str]:
 
 def print_sweep(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -> None:
     """Print error and density for each R: the mean over scenes, or the scene if there is one."""
-    chosen = [row for row in rows if row["mask"] == "nonocc" and row["threshold_px"] == SWEEP_THRESHOLD]
+    chosen = [row for row in rows if row["mask"] == MASK and row["threshold_px"] == THRESHOLD]
     if chosen:
         _print_rows(averaged(chosen), masks)

@@ -1,1 +1,1 @@
-"""Other matchers and confidence measures beside ours: the paper's experiments."""
+"""Compare with other matchers and confidence measures: the paper's experiments."""

@@ -1,4 +1,4 @@
-"""What the transforms are worth: matching-Nets that see different channels, trained alike from nothing."""
+"""Measure what each channel is worth: train matching-Nets on different channels, each from random weights."""
 
 from collections.abc import Iterator
 

@@ -1,7 +1,7 @@
 """The paper's experiments side by side: raw maps, error at equal density, confidence measures.
 
-Baselines are products like all others: each is computed once and then read from the cache. Those whose
-packages or training scenes are not there are left out, and say why.
+Baselines are products like all others: each is computed once and then read from the cache. A baseline
+whose packages or training scenes are missing is left out, with the reason.
 """
 
 import dataclasses
@@ -47,7 +47,7 @@ MATCHERS = {
 }
 """Other matchers, by name: their products have a ``dense`` map, and a ``disparity`` after their own checks."""
 LOWERED = "MC-CNN accurate, less 0.5 px"
-"""The accurate weights answer about half a pixel high, which decides many errors of more than 1 px."""
+"""MC-CNN's accurate weights give disparities about 0.5 px too high, which decides many errors above 1 px."""
 MEASURES = {
     "evaluation-Net and agreement": ("confidence", "confidence"),
     "evaluation-Net": ("confidence", "network"),
@@ -175,7 +175,7 @@ def _require_others(products: Sequence[str]) -> None:
 
 
 def _with_truth(dataset: Dataset) -> tuple[Dataset, list[str]]:
-    """Return the dataset without the scenes that nothing can be compared on, and a note for each."""
+    """Return the dataset without scenes of unknown truth, and a note for each of those."""
     known = tuple(scene for scene in dataset.scenes if scene.has_truth)
     if not known:
         raise UsageError(f"{dataset.spec}: no scene has a ground truth, so there is nothing to compare with")
@@ -201,7 +201,7 @@ def _available(
 
 
 def _reason(product: str, trained: bool, without: Sequence[str]) -> str:
-    """Return why a product is not made; nothing if it is."""
+    """Return why a product cannot be made; empty if it can."""
     if product in without:
         return _LEFT_OUT
     inputs = (STAGES[name] for name in STAGES[product].inputs if name in STAGES)
@@ -212,7 +212,7 @@ def _reason(product: str, trained: bool, without: Sequence[str]) -> str:
 
 
 def _no_ablation(trained: bool, without: Sequence[str]) -> str:
-    """Return why no matching-Nets with different channels are trained; nothing if they are."""
+    """Return why no matching-Nets with different channels are trained; empty if they are."""
     return _LEFT_OUT if "ablation" in without else "" if trained else _UNTRAINED
 
 
@@ -238,7 +238,7 @@ def _rows(result: Result, experiments: Sequence[str]) -> Iterator[Row]:
 
 
 def _named(rows: Iterable[Row], protocol: str) -> Iterator[Row]:
-    """Yield the rows of networks that were trained by a protocol, under its name; the curve stays ours alone."""
+    """Yield the rows of networks trained by a protocol, under its name; without the curve, which is dual-cnn's only."""
     for row in rows:
         if row["experiment"] != "curve":
             yield row | {"method": f"{row['method'].removesuffix(_SHIPPED)}, {protocol}"}

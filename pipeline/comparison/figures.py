@@ -1,20 +1,20 @@
-"""Figures of a comparison: a dot a scene and method, and error against invalid pixels."""
+"""Draw a comparison: a dot for each scene and method, and error against invalid pixels."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from semidense.pipeline.comparison.experiments import MATCHERS, Comparison
 from semidense.pipeline.figures.colours import BLUE, QUIET, RED, disparity_rgb, disparity_span
 from semidense.pipeline.figures.curves import draw_matchers
 from semidense.pipeline.figures.drawing import new_figure
+from semidense.pipeline.results.metric_rows import FIGURES, METHOD, Row, mean_name, mean_rows
 from semidense.stages.stage import Array, Arrays
 from semidense.stages.transforms.gray import to_gray
 
-Row = Mapping[str, Any]
-_UNITS = {"raw_bad": "wrong or unreported pixels (%)", "auc": "area under the error curve (1)"}
 _MARKED = (0.0, 0.5, 0.9, 0.99)
 """Values of R that are written beside the curve."""
 
@@ -24,24 +24,26 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 
 
     Args:
         rows: of one experiment, mask and threshold; the first method is drawn at the top. Where they have an
-            ``auc_optimal``, its mean is drawn as a line across.
+            ``auc_optimal``, its mean is drawn as a line across. A method that lacks a scene has no bar: its mean could
+            not be compared.
         figure: the key that is drawn.
         title: stands above.
         width: of the figure, inches.
     """
-    methods = list(dict.fromkeys(row["method"] for row in rows))
+    over = mean_name(len({row["scene"] for row in rows}))
+    means = {row["method"]: row if row["scene"] == over else {} for row in mean_rows(rows)}
     drawn = new_figure(title)
-    drawn.set_size_inches(width, 1.8 + 0.45 * len(methods))
+    drawn.set_size_inches(width, 1.8 + 0.45 * len(means))
     axes = drawn.subplots()
-    values = [[row[figure] for row in rows if row["method"] == method and figure in row] for method in methods]
-    axes.barh(methods, [np.mean(each) for each in values], color=QUIET, label="mean")
-    for method, each in zip(methods, values, strict=True):
-        axes.plot(each, [method] * len(each), "o", color=BLUE, markersize=4, label="a scene")
-    optimal = [row["auc_optimal"] for row in rows if "auc_optimal" in row and row["method"] == methods[0]]
-    if optimal:
-        axes.axvline(float(np.mean(optimal)), color=RED, linestyle="--", label="mean of the optimal area")
+    axes.barh(list(means), [row.get(figure, 0) for row in means.values()], color=QUIET, label=over)
+    for method in means:
+        values = [row[figure] for row in rows if row["method"] == method and figure in row]
+        axes.plot(values, [method] * len(values), "o", color=BLUE, markersize=4, label="a scene")
+    optimal = next(iter(means.values())).get("auc_optimal")
+    if optimal is not None:
+        axes.axvline(optimal, color=RED, linestyle="--", label="mean of the optimal area")
     axes.invert_yaxis()
-    axes.set(xlabel=_UNITS[figure], xlim=(0, None))
+    axes.set(xlabel=f"{FIGURES[figure].meaning} ({FIGURES[figure].unit})", xlim=(0, None))
     axes.grid(axis="x", alpha=0.3)
     handles, labels = axes.get_legend_handles_labels()
     drawn.legend(*_first_of_each(handles, labels), loc="outside lower center", ncols=3, frameon=False)
@@ -57,22 +59,24 @@ def density_figure(means: Sequence[Row]) -> Figure:
     """Return error against invalid pixels: our curve over R, a point each other matcher.
 
     Args:
-        means: mean rows of one mask and threshold, of the experiments ``curve`` and ``density``.
+        means: mean rows of one mask and threshold, of the experiments ``curve`` and ``density``. A matcher whose mean
+            is over fewer scenes than our curve is left out.
     """
     drawn = new_figure("Error versus invalid pixels")
     drawn.set_size_inches(9.5, 6)
     axes = drawn.subplots()
-    curve = [row for row in means if row["experiment"] == "curve" and "bad" in row]
+    ours = [row for row in means if row["experiment"] == "curve"]
+    curve = [row for row in ours if "bad" in row]
     axes.plot([row["invalid"] for row in curve], [row["bad"] for row in curve], color=BLUE, linewidth=2)
-    axes.lines[0].set_label("dual-cnn, over R")
+    axes.lines[0].set_label(f"{METHOD}, over R")
     for row in curve:
         if row["R"] in _MARKED:
             place = row["invalid"], row["bad"]
             axes.plot(*place, ".", color=BLUE, markersize=9)
             axes.annotate(f"R = {row['R']:g}", place, xytext=(6, 6), textcoords="offset points", fontsize="small")
+    mask, threshold, scenes = ours[0]["mask"], ours[0]["threshold_px"], ours[0]["scene"]
     others = [row for row in means if row["experiment"] == "density" and "bad" in row and "R" not in row]
-    draw_matchers(axes, others)
-    mask, threshold, scenes = means[0]["mask"], means[0]["threshold_px"], means[0]["scene"]
+    draw_matchers(axes, [row for row in others if row["scene"] == scenes])
     axes.set_xlabel(f"invalid: {mask} pixels without a disparity (%), {scenes} scenes")
     axes.set_ylabel(f"bad: reported {mask} pixels off by more than {threshold:g} px (%)")
     axes.margins(x=0.12)
@@ -83,25 +87,15 @@ def density_figure(means: Sequence[Row]) -> Figure:
     return drawn
 
 
-if TYPE_CHECKING:
-    from semidense.pipeline.comparison.experiments import Comparison
-
 SCENES = 3
 """Scenes on a sheet, at most."""
-_OTHERS = {
-    "sgm": "SGM",
-    "sncc": "SNCC",
-    "census": "census",
-    "mc_cnn": "MC-CNN fast",
-    "mc_cnn_accurate": "MC-CNN accurate",
-}
 _FLAT = 2
 """Gray levels between neighbours up to which a pixel counts as untextured."""
 _WIDTH = 2.6
 """Width of a picture, inches."""
 
 
-def sheets(found: "Comparison") -> dict[str, Figure]:
+def sheets(found: Comparison) -> dict[str, Figure]:
     """Return two sheets by file name: the scenes whose views are lit most differently, and those of least texture."""
     images = {scene: found.images(scene) for scene in found.scenes}
     return {
@@ -128,7 +122,7 @@ def untextured_share(images: Arrays) -> float:
     return float(np.mean((across <= _FLAT) & (down <= _FLAT)))
 
 
-def _sheet(found: "Comparison", scenes: list[str], title: str) -> Figure:
+def _sheet(found: Comparison, scenes: list[str], title: str) -> Figure:
     """Return a figure with a row a scene: view, truth, raw map, semi-dense map, the others' maps."""
     arrays = {scene: found.arrays(scene) for scene in scenes}
     rows = {scene: _pictures(products, found.R) for scene, products in arrays.items()}
@@ -152,9 +146,9 @@ def _pictures(products: Mapping[str, Arrays], R: float | None) -> dict[str, NDAr
     span = disparity_span(truth)
     maps: dict[str, Array] = {
         "truth": truth,
-        "dual-cnn raw": products["disparity"]["disparity"],
-        "dual-cnn" + (f", R = {R:g}" if R is not None else ""): products["semidense"]["disparity"],
-        **{name: products[product]["disparity"] for product, name in _OTHERS.items() if product in products},
+        f"{METHOD} raw": products["disparity"]["disparity"],
+        METHOD + (f", R = {R:g}" if R is not None else ""): products["semidense"]["disparity"],
+        **{name: products[product]["disparity"] for name, product in MATCHERS.items() if product in products},
     }
     left = np.repeat(to_gray(products["images"]["left"])[..., np.newaxis], 3, axis=2)
     return {"left view": left} | {name: disparity_rgb(values, *span) for name, values in maps.items()}

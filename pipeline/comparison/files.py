@@ -1,4 +1,4 @@
-"""What a comparison leaves: tables, ``comparison.csv``, ``comparison.json``, and figures."""
+"""Write the files of a comparison: ``comparison.csv``, ``comparison.json``, and figures."""
 
 import json
 from collections.abc import Iterable
@@ -8,9 +8,9 @@ from typing import Any
 from semidense.datasets.formats.atomic import atomic_write
 from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.figures import density_figure, dots_figure, sheets
-from semidense.pipeline.comparison.tables import THRESHOLD, TITLES, at, of, quoted
+from semidense.pipeline.comparison.tables import TITLES, at, of, quoted
 from semidense.pipeline.files.writing import explaining, save_png, table_text, writable_folder
-from semidense.pipeline.results.metric_rows import FIGURES
+from semidense.pipeline.results.metric_rows import FIGURES, THRESHOLD
 
 COLUMNS = ("experiment", "scene", "method", "mask", "threshold_px", "R", *FIGURES, "quoted", "data")
 """The columns of ``comparison.csv``."""

@@ -1,4 +1,4 @@
-"""What the paper's text reports, to stand beside what is measured here; never mixed with it."""
+"""The figures that the paper's text reports. They are shown beside ours, and never averaged with them."""
 
 from typing import Any
 
@@ -27,7 +27,7 @@ QUOTED: tuple[dict[str, Any], ...] = (
     *_rows("auc", "auc", _AUC, {"dual-cnn (paper)": 0.0522}),
     *_rows("auc", "auc", _AUC_OTHERS, {"APKR (paper)": 0.0728, "O1 (paper)": 0.0680, "CCNN (paper)": 0.0637}),
 )
-"""A row a figure: errors in percent, rms in px, areas as fractions. Other data and another resolution than here."""
+"""One row a figure: errors in percent, rms in px, areas as fractions. Data and resolution differ from ours."""
 
 NAMED = ("SED", "R-NCC", "r200high", "ICSG", "DF", "MotionStereo", "IDR", "TMAP")
-"""Systems in the paper's plot of error against invalid pixels, whose places in it the text does not give."""
+"""Systems that the paper only plots: its text gives no figures for them."""

@@ -1,4 +1,4 @@
-"""The paper's own protocols, more lenient than ours: what is tested on, or pairs like it, is learnt from too."""
+"""The paper's own protocols, more lenient than ours: they also train on the test pairs, or on pairs like them."""
 
 import dataclasses
 import re
@@ -12,9 +12,9 @@ from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.plan.training_split import assign_folds, outside
 
 FOLDS = 2
-"""Parts of the scenes; each is tested by networks that learnt from the others."""
+"""Number of parts of the scenes; each part is tested with networks trained on the others."""
 PROTOCOLS = {"same": "trained on the same pairs", "folds": f"{FOLDS}-fold"}
-"""What they are called in tables, by the name that is asked for."""
+"""The name of each protocol in tables, by the name that ``--protocol`` takes."""
 
 
 def require_protocols(names: Sequence[str]) -> None:
@@ -29,7 +29,7 @@ def protocol_requests(name: str, task: Task, dataset: Dataset, training: tuple[S
 
     Args:
         name: of ``PROTOCOLS``.
-        task: with the settings.
+        task: gives the settings.
         dataset: the scenes to test on; those that are among ``training`` are left out.
         training: further scenes to learn from; with ``same`` none of them is used.
 
@@ -59,5 +59,5 @@ def protocol_requests(name: str, task: Task, dataset: Dataset, training: tuple[S
 
 
 def _place(scene: SceneSource) -> str:
-    """Return a scene's name without Middlebury's letter for another exposure or lighting of the same place."""
+    """Return a scene's name without Middlebury's last letter: E, another exposure, or L, another lighting."""
     return re.sub(r"(?<=[a-z])[EL]$", "", scene.name)

@@ -1,4 +1,4 @@
-"""The figures of a comparison: what one map, or one confidence, does on one scene."""
+"""Compute the rows of a comparison: the figures of one map, or of one confidence, on one scene."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,8 +27,8 @@ class Judged:
     Attributes:
         scene: its name.
         truth: the product ``truth``.
-        masks: those that figures are wanted for, of ``MASKS``.
-        thresholds: px, those that figures are wanted for.
+        masks: the masks to give figures for, of ``MASKS``.
+        thresholds: the errors to give figures for, px, of ``THRESHOLDS``.
     """
 
     scene: str
@@ -58,13 +58,13 @@ class Judged:
 
 
 def raw_rows(judged: Judged, method: str, dense: NDArray[np.float32]) -> Iterator[Row]:
-    """Yield the error of a dense map: what it does not report counts as wrong."""
+    """Yield the error of a dense map; pixels that it does not report count as wrong."""
     for row, mask, threshold in judged.rows("raw", method):
         yield row | _known({"raw_bad": Errors.of(dense, judged.disparity, mask).raw_bad(threshold)})
 
 
 def density_rows(judged: Judged, method: str, reported: NDArray[np.float32]) -> Iterator[Row]:
-    """Yield what a semi-dense map does on the pixels that it reports."""
+    """Yield the errors of the pixels that a semi-dense map reports, and the share that it does not report."""
     for row, mask, threshold in judged.rows("density", method):
         errors = Errors.of(reported, judged.disparity, mask)
         figures = {
@@ -111,5 +111,5 @@ def auc_rows(
 
 
 def _known(figures: Mapping[str, float]) -> dict[str, float]:
-    """Return the figures that apply: a key whose figure is NaN is absent."""
+    """Return the figures without those that do not apply (NaN)."""
     return {name: value for name, value in figures.items() if not np.isnan(value)}

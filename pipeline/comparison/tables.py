@@ -1,4 +1,4 @@
-"""Print a comparison: a table an experiment, and the paper's figures beside."""
+"""Print a comparison: one table an experiment, then the paper's figures."""
 
 from collections.abc import Iterable, Sequence
 from textwrap import fill
@@ -10,11 +10,9 @@ from rich.table import Table
 from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.paper_figures import QUOTED
 from semidense.pipeline.comparison.rows import Row
-from semidense.pipeline.results.metric_rows import FIGURES, mean_name
+from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, mean_name
 from semidense.pipeline.results.text import results
 
-MASK, THRESHOLD = "nonocc", 1.0
-"""Mask, and unless another is wished for threshold in px of the image at hand, of tables and figures."""
 TITLES = {
     "raw": "Raw maps: wrong or unreported pixels, %",
     "auc": "Confidence of the raw map: area under the error curve; lower is better",
@@ -39,7 +37,7 @@ def of(rows: Iterable[Row], experiment: str) -> list[Row]:
 
 
 def print_comparison(found: Comparison, masks: Iterable[str], threshold: float = THRESHOLD) -> None:
-    """Print a table an experiment, the paper's figures beside, and why something is missing.
+    """Print one table an experiment, the paper's figures, and the reason for each method that was not run.
 
     Args:
         found: the comparison.
@@ -65,7 +63,7 @@ def print_comparison(found: Comparison, masks: Iterable[str], threshold: float =
 
 
 def _by_scene(rows: Sequence[Row], means: Sequence[Row], experiment: str, figure: str) -> Table:
-    """Return a table of scenes and methods: down goes whichever are more."""
+    """Return a table of scenes and methods; the more numerous of the two are the rows."""
     methods = {row["method"]: (row["method"], figure) for row in means}
     if experiment == "auc":
         methods["optimal"] = (means[0]["method"], "auc_optimal")
@@ -88,7 +86,7 @@ def _by_scene(rows: Sequence[Row], means: Sequence[Row], experiment: str, figure
 
 
 def _density_table(means: Sequence[Row]) -> Table:
-    """Return a table of what semi-dense maps report: means over the scenes."""
+    """Return a table of semi-dense maps: mean figures over the scenes."""
     plural = "" if means[0]["scene"] == mean_name(1) else "s"
     title = f"Semi-dense maps, {means[0]['scene']} scene{plural}"
     table = _table(title, "method", "R", *(FIGURES[name].head for name in _DENSITY))
@@ -99,7 +97,7 @@ def _density_table(means: Sequence[Row]) -> Table:
 
 
 def _fitted(table: Table, console: Console) -> Table:
-    """Return the table, its headings a few words a line if it is too wide for the console: words stay whole."""
+    """Return the table; if it is too wide for the console, its headings are broken into lines between words."""
     if console.measure(table, options=console.options.update(width=1000)).maximum > console.width:
         for column in table.columns:
             words = str(column.header).split()

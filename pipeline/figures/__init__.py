@@ -1,1 +1,1 @@
-"""What people look at: figures of every product."""
+"""Draw every product with Matplotlib."""

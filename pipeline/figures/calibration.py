@@ -1,4 +1,4 @@
-"""A calibration: how often pixels of a confidence are right, and what a threshold on it buys."""
+"""Draw a calibration: how often pixels of a confidence are right, and the error and density at each threshold."""
 
 import numpy as np
 import xarray as xr

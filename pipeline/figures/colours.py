@@ -1,4 +1,4 @@
-"""Colours that also the colour-blind can tell apart, and a colour for "none" that is no value's.
+"""Colours that colour-blind readers can tell apart; black, for pixels without a value, is on no scale.
 
 The maps are perceptually even. The dark ends are cut off, so that black, which stands for
 "none", is far from every colour in use, as seen with any of the common kinds of colour blindness.
@@ -26,7 +26,7 @@ ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PURPLE = (
 LINES = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY)
 """Colours of lines on white, in the order in which they are used."""
 QUIET = "#B0B0B0"
-"""What stands back behind the rest."""
+"""The colour of what is less important than the rest."""
 _CLIPPED = 0.5
 
 
@@ -54,7 +54,7 @@ def disparity_colours() -> Colormap:
 
 @cache
 def confidence_colours() -> Colormap:
-    """Return the colours of confidences, other ones than the disparities': sure is yellow, none is black."""
+    """Return the colours of confidences, different from those of disparities: sure is yellow, none is black."""
     return _part("cividis", 0.15, 1)
 
 
@@ -107,9 +107,9 @@ def _rgb(values: NDArray[Any], vmin: float, vmax: float, colours: Colormap) -> N
 
 
 def disparity_span(disparity: NDArray[Any]) -> tuple[float, float]:
-    """Return the disparities, whole px, between which a map is coloured.
+    """Return the disparities of the first and the last colour of a map, whole px.
 
-    Half a percent at each end may lie beyond: a few wild errors must not take all colours. A map without
+    The lowest and the highest 0.5 % may lie beyond, so that a few wild errors do not take all colours. A map without
     any disparity gets (0, 1).
 
     >>> disparity_span(np.array([[3.5, 7.25, np.nan]]))
@@ -124,7 +124,7 @@ def disparity_span(disparity: NDArray[Any]) -> tuple[float, float]:
 
 
 ERROR_COLOURS = ("#FFF7BC", "#FEC44F", "#F2780C", "#C02A0A", "#6A0532")
-"""Of errors up to each of ``THRESHOLDS``, and above the last: lighter is better. None is black, unknown truth gray."""
+"""Colours of errors up to each of ``THRESHOLDS``, and above the last: lighter is better."""
 ERROR_LABELS = (
     f"at most {THRESHOLDS[0]:g} px",
     *(f"{low:g} to {high:g} px" for low, high in pairwise(THRESHOLDS)),

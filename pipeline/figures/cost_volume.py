@@ -19,12 +19,12 @@ from semidense.pipeline.plan.errors import UsageError
 from semidense.stages.disparity.winner_takes_all import winner_take_all
 
 _TICKS = (0.5, 0.01, 0.99, 0.1, 0.9, 1e-4, 0.9999, 1e-6, 0.999999, 1e-8, 0.99999999)
-"""Probabilities on an axis of log-odds, the most telling first."""
+"""Probabilities to mark on an axis of log-odds, the most important first."""
 _HALO = withStroke(linewidth=5, foreground="white")
 _CURVE_HEIGHT = 3.5
 """Height that the curve needs beside a very wide image, inches."""
 _ROWS = 32
-"""Rows in the middle of the image that the usual disparity is taken from."""
+"""Rows in the middle of the image whose winners decide which disparity is drawn by default."""
 
 
 def draw_costs(

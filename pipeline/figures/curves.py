@@ -1,4 +1,4 @@
-"""The error-versus-invalid curve: what a threshold on the confidence buys, and what it costs."""
+"""Draw error against invalid pixels: the two as the threshold on the confidence grows."""
 
 from collections.abc import Callable, Iterable, Sequence
 from itertools import cycle
@@ -34,7 +34,7 @@ def error_curve_figure(
     Args:
         rows: metrics rows as promised to scripts; those of another mask or threshold, without R or with nothing
             reported (no ``bad``) are passed over.
-        title: stands above, taken literally.
+        title: of the figure; no mathematics is parsed in it.
         mask: ``nonocc`` or ``all``.
         threshold: px, error above which a pixel is wrong.
         others: a row a matcher that becomes a point, with ``method``, ``invalid`` and ``bad`` over the same scenes.
@@ -79,7 +79,7 @@ def _points(rows: Iterable[Row]) -> Curve:
 
 
 def _family(row: Row) -> str:
-    """Return what a curve shares but for scene and R: the settings of its variant, else nothing."""
+    """Return the settings of a row's variant other than R; empty without any."""
     settings = str(row.get("variant", "")).split(", ")
     return ", ".join(setting for setting in settings if not setting.startswith("semidense.R="))
 

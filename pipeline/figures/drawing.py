@@ -1,4 +1,4 @@
-"""What the figures are put together from: axes in pixels, maps with a colour bar, legends that say what is missing."""
+"""The parts of figures: axes in pixels, maps with a colour bar, legends that say what is missing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ _TITLE = 72
 
 @dataclass(frozen=True)
 class Scale:
-    """What colours mean.
+    """A scale of colours.
 
     Attributes:
         colours: from low to high; "bad" is the colour of none.
@@ -50,7 +50,7 @@ def disparity_scale(disparity: NDArray[Any], label: str = "disparity (px)") -> S
 
 
 def new_figure(title: str) -> Figure:
-    """Return an empty figure under a title, which is taken literally: a scene's name is no formula."""
+    """Return an empty figure under a title, which is taken literally: a scene's name is not read as mathematics."""
     figure = Figure(dpi=_DPI, layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.1))
     figure.suptitle(fill(title, _TITLE), fontsize="large", fontweight="bold", parse_math=False)
     return figure

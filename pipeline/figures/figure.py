@@ -54,6 +54,8 @@ _DRAW: Mapping[str, Callable[..., None]] = {
     "calibrated_confidence": draw_confidence,
     "semidense": draw_disparity,
     "right_disparity": draw_disparity,
+    "aggregated": draw_disparity,
+    "right_aggregated": draw_disparity,
     "refined": draw_disparity,
     "filled": draw_disparity,
     "ranking": draw_metrics,

@@ -1,4 +1,4 @@
-"""The figures of a scene as a table to look at."""
+"""Draw the figures of a scene as a table."""
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -32,7 +32,7 @@ def draw_metrics(figure: Figure, dataset: xr.Dataset) -> None:
 
 
 def _style(table: Table) -> None:
-    """Set the head apart, and every other row; lines would only distract."""
+    """Colour the head and every other row, in place of lines."""
     table.auto_set_font_size(False)
     for (row, _), cell in table.get_celld().items():
         cell.set(linewidth=0, facecolor="#F2F2F2" if row % 2 else "white")

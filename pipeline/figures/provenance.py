@@ -22,18 +22,18 @@ PIXELS, POINTS = 150, 72
 """Units an inch: of a PNG, and of SVG and PDF, which are drawn in points."""
 FORMATS = (".svg", ".png", ".pdf")
 COLOURS = {"origin": "#dceefb", "net": "#fdeccb", "product": "#f4f4f4", "gone": "#f8d7da"}
-"""What is read, trained networks and weights, what is computed, what was deleted since."""
+"""Colours of boxes: files that are read, networks and weights, computed products, products deleted since."""
 
 LINE_WIDTH = 0.3
 """Columns that a line needs to pass a row; a box needs 1."""
 SWEEPS = 8
-"""Times that the rows are ordered anew, down and up: more changed none of the pictures looked at."""
+"""Number of times that the rows are reordered, down and up; more did not change the pictures tried."""
 
 T = TypeVar("T")
 Box = tuple[str, str]
 """Product and scene; products of several training scenes share a box."""
 Stop = tuple[Box, int]
-"""Where a box stands, or in a lower row the line from it to what is made of it further down."""
+"""A box in its row, or in a lower row the line that leads from it further down."""
 Point = tuple[float, float]
 """Column and row; rows count downwards."""
 
@@ -121,7 +121,7 @@ def _edges(axes: Axes, text: Text) -> tuple[float, float, float, float]:
 
 
 def _group(each: Ancestor, scene: str) -> str:
-    """Return whose product it is: the scene's, the training split's, or one of the training scenes'."""
+    """Return the scene of a product, `training split`, or `training scenes` for any of these."""
     return each.scene if each.entry is None or each.scene in (scene, "training split") else "training scenes"
 
 
@@ -170,7 +170,7 @@ def _columns(parents: Mapping[Box, Sequence[Box]], rows: Mapping[Box, int]) -> d
 
 
 def _apart(wanted: Sequence[float], widths: Sequence[float]) -> list[float]:
-    """Return places as near as can be to those wanted, in the least squares, of things of some widths side by side.
+    """Return places for things of given widths, side by side, nearest to the places wanted in least squares.
 
     What is too close forms a group, which stands where its members want to be in the mean.
 

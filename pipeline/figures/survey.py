@@ -1,4 +1,4 @@
-"""The figure of a look at a pair: what moved how far, along the row and across it."""
+"""Draw the survey of a pair: how far each match moved along its row and across it."""
 
 import numpy as np
 import xarray as xr
@@ -12,7 +12,7 @@ from semidense.pipeline.figures.drawing import image_panels
 from semidense.stages.disparity.survey import FIELDS
 
 _LEAST_SPAN = 2.0
-"""The vertical offsets' colours reach at least so far, px."""
+"""Least vertical offset at the ends of its scale, px."""
 
 
 def draw_survey(figure: Figure, dataset: xr.Dataset) -> None:
@@ -47,7 +47,7 @@ def _draw_matches(
 
 
 def _span(values: NDArray[np.float32], centred: bool) -> tuple[float, float]:
-    """Return the values of the first and last colour; one in a hundred at each end may lie beyond."""
+    """Return the values of the first and last colour; 1 % at each end may lie beyond."""
     low, high = np.percentile(values, (1, 99)) if values.size else (0.0, 1.0)
     reach = max(_LEAST_SPAN, abs(low), abs(high))
     return (-reach, reach) if centred else (float(low), float(high))

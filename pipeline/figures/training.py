@@ -19,7 +19,7 @@ from semidense.stages.evaluation.declaration import STRIDE
 _SHOWN = 6
 """Crops or grids in a figure."""
 _MOST = 2000
-"""Samples that are looked at; of more, so many at even distances."""
+"""Most samples that a figure reads; of more, this many at even distances."""
 _CLASSES = {-1: ("unknown", QUIET), 0: ("wrong", RED), 1: ("right", BLUE)}
 """Name and colour of each label."""
 
@@ -146,7 +146,7 @@ def _draw_grid(axes: Axes, seen: xr.Dataset, index: int) -> None:
 
 
 _COIN = float(np.log(2))
-"""The loss of a network that has learnt nothing, nats."""
+"""The loss of a coin's guess, nats."""
 
 
 def draw_network(figure: Figure, dataset: xr.Dataset) -> None:
@@ -156,7 +156,7 @@ def draw_network(figure: Figure, dataset: xr.Dataset) -> None:
 
 
 def loss_name(params: Mapping[str, Any]) -> str:
-    """Return what the loss of a network consists of, by the settings of its training; these may not be told.
+    """Return the name of a network's loss, from the settings of its training if they are known.
 
     >>> loss_name({"ranking": 4.0}), loss_name({})
     ('class-balanced cross-entropy + 4 x ranking loss', 'class-balanced cross-entropy')

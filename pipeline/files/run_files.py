@@ -33,7 +33,7 @@ from semidense.pipeline.files.file_names import safe_names
 from semidense.pipeline.files.selection import Wanted, wanted
 from semidense.pipeline.files.writing import explaining, save_png, table_text, writable_folder, write_rgb
 from semidense.pipeline.plan.plan import Made
-from semidense.pipeline.results.metric_rows import SWEEP_THRESHOLD
+from semidense.pipeline.results.metric_rows import THRESHOLD
 from semidense.pipeline.results.provenance import lineage
 from semidense.pipeline.results.result import Result
 from semidense.stages.catalog import STAGES
@@ -205,5 +205,5 @@ def write_sweep(rows: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
     picture.unlink(missing_ok=True)
     if not any("bad" in row and "R" in row for row in rows):
         return [table]
-    save_png(error_curve_figure(rows, threshold=SWEEP_THRESHOLD), picture)
+    save_png(error_curve_figure(rows, threshold=THRESHOLD), picture)
     return [table, picture]

@@ -16,11 +16,11 @@ from semidense.pipeline.figures.colours import (
 )
 
 Html = str
-"""A piece of a page. What is no piece of a page yet goes through ``text``."""
+"""A piece of a page. Any other value becomes one through ``text``, which escapes it."""
 
 
 def text(value: object) -> Html:
-    """Return any value as text of a page.
+    """Return any value as escaped text for a page.
 
     >>> text("a < b")
     'a &lt; b'
@@ -29,7 +29,7 @@ def text(value: object) -> Html:
 
 
 def tag(name: str, *content: Html, **attributes: object) -> Html:
-    """Return an element. ``class_`` is the attribute ``class``, ``data_x`` is ``data-x``; None leaves one out.
+    """Return an element. ``class_`` is the attribute ``class``, ``data_x`` is ``data-x``; None leaves it out.
 
     >>> tag("p", text("1 < 2"), class_="note")
     '<p class="note">1 &lt; 2</p>'
@@ -40,12 +40,12 @@ def tag(name: str, *content: Html, **attributes: object) -> Html:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]], *, caption: str, words: int = 1) -> Html:
-    """Return a table that scrolls sideways by itself where it is too wide; the last row of several may be a mean.
+    """Return a table that scrolls sideways by itself where it is too wide.
 
     Args:
         head: names of the columns, with units.
         rows: cells as text.
-        caption: what it shows, as text.
+        caption: what the table shows, as text.
         words: columns on the left that hold words; the others hold numbers and stand at the right.
     """
     cells = [[("word" if i < words else "number", each) for i, each in enumerate(row)] for row in [head, *rows]]
@@ -59,12 +59,12 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]], *, caption: str
 
 
 def folded(summary: str, *content: Html) -> Html:
-    """Return what is folded until one opens it."""
+    """Return content that stays hidden until the reader opens it."""
     return tag("details", tag("summary", text(summary)), *content)
 
 
 _STOPS = 12
-"""Colours of a gradient."""
+"""Number of colours in the bar of a legend."""
 
 
 def disparity_legend(span: tuple[float, float], none: str) -> Html:
@@ -78,7 +78,7 @@ def confidence_legend(none: str = "none") -> Html:
 
 
 def error_legend(shares: list[str] | None = None, none: str = "no disparity") -> Html:
-    """Return the legend of a map of errors; with the share of each class, if they are given."""
+    """Return the legend of a map of errors; with the share of each class, if ``shares`` are given."""
     told = [f"{label}: {share}" for label, share in zip(ERROR_LABELS, shares, strict=True)] if shares else ERROR_LABELS
     classes = [swatch(colour, label) for colour, label in zip(ERROR_COLOURS, told, strict=True)]
     return "".join([*classes, swatch(NONE, none), swatch(UNKNOWN, "truth unknown")])
@@ -91,5 +91,5 @@ def _gradient(colours: Colormap, low: str, high: str) -> Html:
 
 
 def swatch(colour: str, label: str) -> Html:
-    """Return a colour and what it means."""
+    """Return a legend entry: a colour and its meaning."""
     return tag("span", tag("span", class_="swatch", style=f"background: {colour}"), text(label), class_="key")

@@ -14,11 +14,11 @@ from semidense.stages.metrics.tally import Tally
 
 _BINS = 10
 _FEWEST = 50
-"""Pixels that a bin must have for its share to say anything."""
+"""Least number of pixels in a bin that is drawn: the share of fewer says little."""
 
 
 class Reliability(NamedTuple):
-    """Of ten bins of confidence, 0 to 0.1 and so on.
+    """How often pixels are right, in ten bins of confidence: 0 to 0.1, 0.1 to 0.2 and so on.
 
     Attributes:
         confidence: (bin,) mean confidence; NaN where there is no pixel.
@@ -32,7 +32,7 @@ class Reliability(NamedTuple):
 
     @property
     def error(self) -> float:
-        """The expected calibration error: the mean distance of share and confidence, over pixels; NaN without any."""
+        """The expected calibration error: |share - confidence| of a pixel's bin, mean over pixels; NaN without any."""
         known = self.pixels > 0
         if not known.any():
             return float("nan")
@@ -43,7 +43,7 @@ def reliability(tallies: list[Tally], mask: str = "all", threshold: float = 1.0)
     """Return how often pixels are right, by confidence, over all pixels of several scenes.
 
     Args:
-        tallies: of the scenes, with the thresholds ``STEPS``.
+        tallies: one a scene, with the thresholds ``STEPS``.
         mask: ``all`` is what the evaluation-Net learns: hidden pixels count too.
         threshold: px, error up to which a pixel is right.
     """

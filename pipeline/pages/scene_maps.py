@@ -1,4 +1,4 @@
-"""What is cached of a scene, as it is shown: maps that fit a screen, and figures over every pixel."""
+"""Read a scene's cached products for a page: maps small enough for a screen, and figures over every pixel."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ from semidense.stages.metrics.tally import Block, Tally
 
 @dataclass(frozen=True, eq=False)
 class SceneMaps:
-    """The maps of a scene; of a large one every ``step``-th row and column. None where a product is not cached.
+    """The maps of a scene; of a large scene every ``step``-th row and column. A map is None if it is not cached.
 
     Attributes:
         size: rows and columns of the image, px.
@@ -40,11 +40,11 @@ class SceneMaps:
 
     @classmethod
     def read(cls, store: Store, keys: Mapping[str, str]) -> "SceneMaps":
-        """Read the products of a scene that are there.
+        """Read the maps of the cached products of a scene.
 
         Args:
             store: the cache.
-            keys: of the products of one scene and configuration, among them ``images`` or ``disparity``.
+            keys: keys of the products of one scene and configuration; ``images`` or ``disparity`` must be there.
 
         Raises:
             CacheError: if one of them is missing or damaged.
@@ -71,7 +71,7 @@ class SceneMaps:
 
     @cached_property
     def tally(self) -> Tally | None:
-        """The figures at every R, over all pixels; None without raw map, confidence or truth."""
+        """The figures at every R, over all pixels; None unless raw map, confidence and truth are cached."""
         return Tally.of(self._blocks()) if {"disparity", "confidence", "truth"} <= set(self._arrays) else None
 
     def _blocks(self) -> Iterator[Block]:
@@ -82,7 +82,7 @@ class SceneMaps:
             yield Block(*(np.asarray(array[rows]) for array in (disparity, confidence, truth, nonocc)))
 
     def error(self) -> NDArray[np.float32] | None:
-        """Return the absolute error of the raw map, px; NaN where map or truth has none; None without both."""
+        """Return the absolute error of the raw map, px; NaN where one has no value; None unless both are cached."""
         if self.disparity is None or self.truth is None:
             return None
         error: NDArray[np.float32] = np.abs(self.disparity - self.truth)
@@ -90,9 +90,9 @@ class SceneMaps:
 
 
 SHOWN = 1_500_000
-"""Pixels of a map that are shown, at most: quarter and half size whole, of larger images every n-th row and column."""
+"""Most pixels of a map on a page: Middlebury's quarter and half size fit, larger images are thinned."""
 _BLOCK = 2_000_000
-"""Elements that are read at a time, about."""
+"""Elements that are read at a time, roughly."""
 
 
 def step_for(height: int, width: int, most: int = SHOWN) -> int:

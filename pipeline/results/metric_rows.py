@@ -1,4 +1,4 @@
-"""Rows of figures, a scene each: what each figure is called and means, and the mean over scenes."""
+"""Rows of figures: the name, unit and meaning of each figure, and the mean over scenes."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 
 Row = Mapping[str, Any]
 METHOD = "dual-cnn"
-"""What this method is called in rows, tables and figures."""
-SWEEP_THRESHOLD = 1.0
-"""The threshold of the table and of the curve of a sweep, px; the CSV has all."""
+"""The name of this project's method in rows, tables and figures."""
+MASK, THRESHOLD = "nonocc", 1.0
+"""Mask and threshold, px of the image at hand, of tables and figures that show one; files and JSON have all."""
 
 
 class Figure(NamedTuple):
-    """What a figure is called, how it is written, and what it means.
+    """The name, unit, digits and meaning of a figure.
 
     Attributes:
         heading: of its column, without the unit.

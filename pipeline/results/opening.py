@@ -1,4 +1,4 @@
-"""Open a cached product as people want to look at it: with coordinates, units and names."""
+"""Open a cached product as a labelled dataset: with coordinates, units and names."""
 
 import json
 import math

@@ -12,12 +12,12 @@ from semidense.pipeline.plan.steps import Step
 from semidense.pipeline.results.text import time_text, value_text
 
 MOST = 3
-"""Inputs of one product that are written out; of more, such as one a training scene, the rest is counted."""
+"""Most inputs of one product that are written out; the rest is counted, such as the training scenes."""
 
 
 @dataclass(frozen=True)
 class Ancestor:
-    """A product in a chain: its entry, or only its name and digest where the entry is gone.
+    """A product that another was made from: its entry, or only name and digest if the entry was deleted.
 
     Attributes:
         product: its name.
@@ -33,7 +33,7 @@ class Ancestor:
 
     @property
     def scene(self) -> str:
-        """Whose product it is; empty if that is not known any more."""
+        """The scene's name; empty if the entry was deleted."""
         return _scene(self.entry) if self.entry else ""
 
     @property
@@ -43,7 +43,7 @@ class Ancestor:
 
     @property
     def origins(self) -> dict[str, str]:
-        """What it was read from, not made from: files and weights with their sha256, or how it was drawn."""
+        """The files or weights it was read from, with their sha256, or the generator that drew it."""
         params = dict(self.entry.recipe.params) if self.entry else {}
         found = {f"file {role}": str(value) for role, value in (params.get("files") or {}).items()}
         if "shipped" in params:
@@ -169,7 +169,7 @@ def lineage(
 
 
 def tree_lines(chain: list[Ancestor]) -> Iterator[str]:
-    """Yield the chain as an indented text; what appears a second time is only named."""
+    """Yield the chain as indented lines; a product that appears again is only named."""
     by_content = {(each.product, each.digest): each for each in chain}
     told: set[tuple[str, str]] = set()
 

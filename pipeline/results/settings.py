@@ -1,4 +1,4 @@
-"""The settings that an entry was made with, told briefly: those that are not the defaults."""
+"""The non-default settings that an entry was made with, as a short text."""
 
 from collections.abc import Iterable
 

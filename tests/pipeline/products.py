@@ -164,6 +164,8 @@ PRODUCTS: dict[str, Callable[[], xr.Dataset]] = {
     "calibrated_confidence": confidence,
     "semidense": disparity,
     "right_disparity": disparity,
+    "aggregated": disparity,
+    "right_aggregated": disparity,
     "refined": disparity,
     "filled": disparity,
     "ranking": ranking,

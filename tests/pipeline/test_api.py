@@ -250,7 +250,7 @@ def test_results_and_plans_are_one_line(trained: Result, trained_task: Task) -> 
     assert max(map(len, texts)) < 100
     assert texts[0] == "<Result of test-0: 27 products made, 0 reused>"
     assert texts[1:] == [
-        "<Plan: 26 products, 0 to make>", "<images of test-0: hit>", "<Step images of test-0>",
+        "<Plan: 27 products, 0 to make>", "<images of test-0: hit>", "<Step images of test-0>",
         "<metrics of test-0: made>",
     ]  # fmt: skip
 

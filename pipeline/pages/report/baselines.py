@@ -1,4 +1,4 @@
-"""What is cached of other matchers and confidence measures, and what they do on the scenes of a report."""
+"""Find cached results of other matchers and confidence measures, and compare them on the scenes of a report."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -23,8 +23,8 @@ PRODUCTS = tuple(
 def cached_baselines(request: Request, store: Store) -> dict[str, dict[str, str]]:
     """Return the keys of the baselines that are cached: scene -> product -> key. Nothing is made.
 
-    A measure that is learnt counts whichever scenes it was trained on; of several the latest. One whose packages are
-    not installed is not looked for: their versions are part of its key.
+    A learnt measure counts whichever scenes it was trained on; of several results the latest is taken. A measure whose
+    packages are not installed is left out: their versions are part of its key.
     """
     known = tuple(scene for scene in request.dataset.scenes if scene.has_truth)
     if not known:
@@ -52,7 +52,7 @@ def _can_be_keyed(product: str) -> bool:
 
 
 class _Search:
-    """Looks for the entries of steps, those of learnt ones among the records of the cache."""
+    """Finds the cached entry of a step; for a learnt product, whichever scenes it was trained on."""
 
     def __init__(self, store: Store, steps: Mapping[str, Planned]) -> None:
         self.store, self.steps = store, steps
@@ -60,7 +60,7 @@ class _Search:
 
     @property
     def entries(self) -> list[Entry]:
-        """All records, the latest first."""
+        """All records of the cache, the latest first."""
         if self._entries is None:
             self._entries = sorted(self.store.entries(), key=lambda entry: entry.created, reverse=True)
         return self._entries
@@ -78,7 +78,7 @@ class _Search:
         return any(each.scene == SPLIT and "shipped" not in each.settings for each in inputs)
 
     def _fits(self, entry: Entry, step: Step) -> bool:
-        """Return whether an entry is the step's but for the scenes that were trained on."""
+        """Return whether an entry differs from the step's result only in the scenes that were trained on."""
         return _same(entry.recipe, step) and all(
             self._is_made_from(entry.recipe, product, ids) for product, ids in step.inputs.items()
         )
@@ -91,21 +91,21 @@ class _Search:
 
 
 def _same(recipe: Recipe, step: Step) -> bool:
-    """Return whether a recipe says what a step says, whatever it is made from."""
+    """Return whether a recipe agrees with a step in all but its inputs."""
     return recipe == Recipe(step.product, step.code, step.settings, recipe.inputs, step.environment)
 
 
 def compared_rows(
     scene: str, keys: Mapping[str, str], store: Store, masks: Sequence[str], thresholds: Sequence[float]
 ) -> list[Row]:
-    """Return the rows of the comparison of what is cached of a scene, as ``pipeline compare`` has them.
+    """Return the rows that ``pipeline compare`` would give for the cached products of a scene.
 
     Args:
         scene: its name.
         keys: of the products that are cached, baselines among them.
         store: the cache.
-        masks: those that figures are wanted for.
-        thresholds: px, those that figures are wanted for.
+        masks: the masks to give figures for, of ``MASKS``.
+        thresholds: the errors to give figures for, px, of ``THRESHOLDS``.
     """
     if not {"truth", *OWN} <= set(keys):
         return []

@@ -5,22 +5,19 @@ from typing import Any
 
 from semidense.pipeline.comparison.rows import Row
 from semidense.pipeline.pages.html import Html, folded, table, tag, text
-from semidense.pipeline.pages.report.gathered import MASK, THRESHOLD_PX
-from semidense.pipeline.results.metric_rows import FIGURES, mean_name, mean_rows, with_means
+from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, mean_name, mean_rows, with_means
 
 _COLUMNS = ("pixels", "raw_bad", "bad", "invalid", "avgerr", "rms")
-_NONE_CACHED = (
-    "No other matcher is cached for these scenes; `pipeline compare` makes them, and they then stand here too."
-)
+_NONE_CACHED = "No other matcher is cached for these scenes. Run `pipeline compare` to add some to this table."
 
 
 def metrics_tables(rows: Sequence[Row], R: float) -> Html:
-    """Return the table at the first threshold, and folded those at all thresholds and masks."""
-    caption = f"Errors above {THRESHOLD_PX:g} px, mask {MASK}, R = {R:g}"
+    """Return the table at ``THRESHOLD``, and below it, folded, the table of all thresholds and masks."""
+    caption = f"Errors above {THRESHOLD:g} px, mask {MASK}, R = {R:g}"
     every = [[row["scene"], row["mask"], f"{row['threshold_px']:g}", *_cells(row)] for row in with_means(rows)]
     head = [FIGURES[name].head for name in _COLUMNS]
     more = table(["scene", "mask", "threshold (px)", *head], every, caption="All thresholds and masks", words=2)
-    chosen = [row for row in rows if row["mask"] == MASK and row["threshold_px"] == THRESHOLD_PX]
+    chosen = [row for row in rows if row["mask"] == MASK and row["threshold_px"] == THRESHOLD]
     first = [[row["scene"], *_cells(row)] for row in with_means(chosen)]
     return table(["scene", *head], first, caption=caption) + folded("All thresholds and masks", more)
 
@@ -30,7 +27,7 @@ def _cells(row: Mapping[str, Any]) -> list[str]:
 
 
 def auc_table(compared: Sequence[Row]) -> Html:
-    """Return the area under the error curve of each cached measure of confidence beside what a perfect one reaches."""
+    """Return a table of the areas under the error curve: of a perfect confidence and of each cached measure."""
     rows = _area_rows(compared)
     if not rows:
         return ""
@@ -44,7 +41,7 @@ def auc_table(compared: Sequence[Row]) -> Html:
         if (scene, own) in every
     ]
     caption = (
-        f"How well a confidence ranks pixels: area under the error curve, errors above {THRESHOLD_PX:g} px, mask "
+        f"How well a confidence ranks pixels: area under the error curve, errors above {THRESHOLD:g} px, mask "
         f"{MASK}; lower is better"
     )
     return table(["scene", "optimal", own, "times the optimal", *others], cells, caption=caption)
@@ -68,14 +65,14 @@ def _density_rows(compared: Sequence[Row]) -> list[Row]:
 
 
 def matcher_points(compared: Sequence[Row], scenes: int) -> list[Row]:
-    """Return the mean of each other matcher that is cached for so many scenes: means over fewer do not compare."""
+    """Return the mean of each other matcher that is cached for all ``scenes``: a mean over fewer cannot be compared."""
     over = mean_name(scenes)
     means = [row for row in mean_rows(_density_rows(compared)) if row["scene"] == over and "bad" in row]
     return [row | {"method": f"{row['method']}, {over}"} for row in means] if scenes > 1 else means
 
 
 def measure_points(compared: Sequence[Row]) -> list[Row]:
-    """Return the areas of the measures that are cached for every scene; none if it is one measure alone."""
+    """Return the areas of the measures that are cached for every scene; no row if there is only one measure."""
     rows = _area_rows(compared)
     scenes = {row["scene"] for row in rows}
     methods = [
@@ -87,7 +84,7 @@ def measure_points(compared: Sequence[Row]) -> list[Row]:
 
 
 def matchers_table(compared: Sequence[Row]) -> Html:
-    """Return what other matchers that are cached report, beside the error of the kept pixels at the same density."""
+    """Return a table of the other cached matchers, with the error of dual-cnn at the density of each."""
     rows = _density_rows(compared)
     if not rows:
         return tag("p", text(_NONE_CACHED), class_="quiet")
@@ -97,7 +94,7 @@ def matchers_table(compared: Sequence[Row]) -> Html:
         [[row["method"], row["scene"], *(FIGURES[name].text(row.get(name)) for name in figures)] for row in part]
         for part in (mean_rows(rows), rows)
     )
-    caption = f"Other matchers after their own checks: errors above {THRESHOLD_PX:g} px, mask {MASK}"
+    caption = f"Other matchers after their own checks: errors above {THRESHOLD:g} px, mask {MASK}"
     if len(means) == len(rows):  # a single scene
         return table(head, every, caption=caption, words=2)
     return table(head, means, caption=caption, words=2) + folded(

@@ -67,13 +67,13 @@ def _pictures(maps: SceneMaps, thresholds: tuple[float, ...]) -> Iterator[Pictur
 
 
 def _span(maps: SceneMaps) -> tuple[float, float]:
-    """Return the disparities that truth, raw and filtered maps are coloured between, so that they compare."""
+    """Return the disparities of the first and last colour, px: the same for truth, raw and filtered maps."""
     known = [each.ravel() for each in (maps.disparity, maps.truth) if each is not None]
     return disparity_span(np.concatenate(known)) if known else (0, 1)
 
 
 def _told(tally: Tally | None, R: float) -> Html:
-    """Return the error of what is kept, which belongs to the picture; nothing without a truth."""
+    """Return the caption of a filtered map: the error of the kept pixels; empty if the truth is not known."""
     rows = [row for row in tally.rows("", "nonocc", 1.0) if row["R"] == R and "bad" in row] if tally else []
     return (
         tag("span", text(f"{rows[0]['bad']:.1f} % of the kept nonocc pixels wrong by more than 1 px")) if rows else ""

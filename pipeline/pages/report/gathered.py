@@ -1,4 +1,4 @@
-"""What of a dataset is cached: the plan of a run, its steps scene by scene, and the maps and figures behind them."""
+"""Gather what is cached for a dataset: the plan of a run, each scene's steps, and their maps and figures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,18 +12,15 @@ from semidense.pipeline.pages.scene_maps import SceneMaps
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Plan, Planned
 from semidense.pipeline.plan.steps import NETS, SPLIT
-from semidense.pipeline.results.metric_rows import METHOD
+from semidense.pipeline.results.metric_rows import MASK, METHOD, THRESHOLD
 from semidense.pipeline.results.provenance import lineage
 from semidense.stages.evaluation.filtering import SemidenseParams
 from semidense.stages.metrics.stage import metric_rows
 
-MASK, THRESHOLD_PX = "nonocc", 1.0
-"""Mask, and error in px of the image at hand, of the tables and curves that stand first."""
-
 
 @dataclass(frozen=True, eq=False)
 class GatheredScene:
-    """A scene and what of it is cached.
+    """A scene and its cached products.
 
     Attributes:
         name: its name.
@@ -39,7 +36,7 @@ class GatheredScene:
 
     @property
     def keys(self) -> dict[str, str]:
-        """The keys of what is cached."""
+        """The keys of the cached products, by product."""
         return {product: planned.key for product, planned in self.steps.items() if planned.key}
 
     @cached_property
@@ -49,26 +46,26 @@ class GatheredScene:
 
     @cached_property
     def rows(self) -> list[dict[str, Any]]:
-        """The rows of its figures; none if they are not cached."""
+        """The rows of its figures; empty if ``metrics`` is not cached."""
         if "metrics" not in self.steps:
             return []
         return metric_rows(self.name, METHOD, self.steps["metrics"].step.R, self.store.read(self.keys["metrics"]))
 
     @cached_property
     def compared(self) -> list[dict[str, Any]]:
-        """The rows of the comparison with the baselines that are cached, at ``MASK`` and ``THRESHOLD_PX``."""
-        return compared_rows(self.name, {**self.keys, **self.baselines}, self.store, [MASK], [THRESHOLD_PX])
+        """The rows of the comparison with the baselines that are cached, at ``MASK`` and ``THRESHOLD``."""
+        return compared_rows(self.name, {**self.keys, **self.baselines}, self.store, [MASK], [THRESHOLD])
 
 
 @dataclass(frozen=True, eq=False)
 class Gathered:
-    """Everything that a report tells.
+    """Everything that a report shows.
 
     Attributes:
-        task: what was asked for.
-        plan: of a run up to the metrics: every step with its state.
+        task: what the report is about.
+        plan: the plan of a run up to ``metrics``, every step with its state.
         store: the cache.
-        scenes: those asked for of which something is cached.
+        scenes: the scenes of the task for which something is cached.
         R: the threshold of the configuration.
     """
 
@@ -85,7 +82,7 @@ class Gathered:
 
     @cached_property
     def entries(self) -> dict[str, Entry]:
-        """The records of what is cached, by key; baselines too."""
+        """The records of all cached products, by key; of baselines too."""
         keys = [planned.key for planned in self.hits if planned.key]
         keys += [key for scene in self.scenes for key in scene.baselines.values()]
         return {key: self.store.require(key) for key in keys}

@@ -1,4 +1,4 @@
-"""The dataflow as a drawing: what each product is made from, what of it is cached, and how long it took."""
+"""Draw the dataflow: what each product is made from, how much of it is cached, and how long it took."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -30,7 +30,7 @@ _WIDTH, _HEIGHT, _GAP_X, _GAP_Y = 124, 56, 34, 54
 
 
 class Done(NamedTuple):
-    """What was found of a product over all scenes."""
+    """How much of a product is cached, over all scenes."""
 
     cached: int
     wanted: int
@@ -44,7 +44,7 @@ class Done(NamedTuple):
 
 
 def done(found: Gathered) -> dict[str, Done]:
-    """Return what was found of each product of the plan, in order."""
+    """Return how much of each product of the plan is cached, in the order of the dataflow."""
     counts: dict[str, Done] = {}
     for planned in found.plan.steps:
         cached, wanted, seconds, size = counts.get(planned.step.product, Done(0, 0, 0.0, 0))
@@ -55,7 +55,7 @@ def done(found: Gathered) -> dict[str, Done]:
 
 
 def done_beside(found: Gathered) -> dict[str, Done]:
-    """Return what was found of each baseline that is cached for some scene."""
+    """Return how much of each baseline is cached, if it is cached for any scene."""
     counts: dict[str, Done] = {}
     for scene in found.scenes:
         for product, key in scene.baselines.items():
@@ -68,7 +68,7 @@ def done_beside(found: Gathered) -> dict[str, Done]:
 
 
 def steps_table(found: Gathered) -> Html:
-    """Return a row a product: how many of them are cached, how long they took to make, how large they are."""
+    """Return a table with a row a product: how many are cached, how long they took, how large they are."""
     rows = [
         [
             product,
@@ -82,7 +82,7 @@ def steps_table(found: Gathered) -> Html:
 
 
 def graph(found: Gathered) -> Html:
-    """Return the drawing; what the words say is in the table too."""
+    """Return the drawing; the table has the same figures for those who cannot see it."""
     counts = done(found)
     shown = [product for product in _PLACES if product in counts]
     rows = 2 if any(_PLACES[product][1] for product in shown) else 1
@@ -97,7 +97,7 @@ def graph(found: Gathered) -> Html:
 
 
 def _drawn_inputs(product: str, counts: Mapping[str, Done]) -> list[str]:
-    """Return the inputs that get an arrow: those between neighbours; the long ones go without saying."""
+    """Return the inputs that get an arrow: only neighbours, since long arrows would cross boxes."""
     x, y = _PLACES[product]
     inputs = [name for name in STAGES[product].inputs if name in _PLACES] if product in STAGES else []
     if product in NETS and not any(name in counts for name in inputs if name.endswith("_samples")):
@@ -141,7 +141,7 @@ def _box(product: str, each: Done) -> Html:
 
 
 def _duration(seconds: float) -> str:
-    """Return a time for people.
+    """Return a duration as text with its unit.
 
     >>> _duration(0.01), _duration(61.24), _duration(7000)
     ('0.01 s', '61 s', '1 h 57 min')

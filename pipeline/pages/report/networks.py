@@ -1,4 +1,4 @@
-"""How the networks learnt: their loss curves, and of shipped ones what is written in the file."""
+"""Show how the networks learnt: their loss curves, and for shipped weights the training record in the file."""
 
 import json
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ def _network(found: Gathered, product: str, planned: Planned) -> Html:
 
 
 def _shipped(product: str, about: Mapping[str, Any]) -> Html:
-    """Return what the package says of its own weights, which were trained elsewhere."""
+    """Return the training record of weights that come with the package."""
     configuration = about.get("configuration", {})
     steps = f", trained in {about['steps']:,} steps" if "steps" in about else ""
     name = loss_name(configuration.get(product, {}))

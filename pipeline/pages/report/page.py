@@ -1,4 +1,4 @@
-"""The page: its parts in order, each left out where nothing is cached for it."""
+"""Build the page: its parts in order; a part with nothing cached is left out."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -20,11 +20,11 @@ from semidense.pipeline.pages.report.figures_tables import (
     metrics_tables,
 )
 from semidense.pipeline.pages.report.galleries import gallery
-from semidense.pipeline.pages.report.gathered import MASK, THRESHOLD_PX, Gathered
+from semidense.pipeline.pages.report.gathered import Gathered
 from semidense.pipeline.pages.report.graph import graph, steps_table
 from semidense.pipeline.pages.report.networks import networks
 from semidense.pipeline.pages.report.pictures import svg
-from semidense.pipeline.results.metric_rows import FIGURES, averaged
+from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, averaged
 from semidense.pipeline.results.text import time_text
 from semidense.stages.metrics.tally import Tally
 
@@ -34,7 +34,7 @@ _CURVE_CAPTION = "The points of the curve, of several scenes their mean; - where
 
 
 def page(found: Gathered) -> str:
-    """Return the whole page; it loads nothing from anywhere."""
+    """Return the whole page as one HTML text that loads no other file."""
     parts = [(title, body) for title, body in _parts(found) if body]
     sections = [tag("section", tag("h2", text(title)), body, id=_anchor(title)) for title, body in parts]
     links = [tag("li", tag("a", text(title), href=f"#{_anchor(title)}")) for title, _ in parts]
@@ -69,8 +69,8 @@ def _title(found: Gathered) -> Iterator[Html]:
 
 
 def _cards(found: Gathered) -> Html:
-    """Return the figures that one looks for first."""
-    rows = [row for row in found.rows if row["mask"] == MASK and row["threshold_px"] == THRESHOLD_PX]
+    """Return the most important figures as cards for the top of the page."""
+    rows = [row for row in found.rows if row["mask"] == MASK and row["threshold_px"] == THRESHOLD]
     count = len(found.scenes)
     cards = [(str(count), "scenes with something cached" if count > 1 else f"scene: {found.scenes[0].name}")]
     if rows:
@@ -84,7 +84,7 @@ def _cards(found: Gathered) -> Html:
 
 
 def _figures(mean: Mapping[str, Any], R: float) -> list[tuple[str, str, str]]:
-    wrong = f"more than {THRESHOLD_PX:g} px off"
+    wrong = f"more than {THRESHOLD:g} px off"
     return [
         ("raw_bad", f"{mean.get('raw_bad', 0):.1f} %", f"of all pixels {wrong} before filtering"),
         ("bad", f"{mean.get('bad', 0):.1f} %", f"of the kept pixels {wrong}, R = {R:g}"),
@@ -135,14 +135,14 @@ def _tallies(found: Gathered) -> list[tuple[str, Tally]]:
 
 
 def _curves(found: Gathered) -> Html:
-    rows = chain.from_iterable(tally.rows(name, threshold=THRESHOLD_PX) for name, tally in _tallies(found))
+    rows = chain.from_iterable(tally.rows(name, threshold=THRESHOLD) for name, tally in _tallies(found))
     chosen = [row for row in rows if row["R"] in _CURVE]
     if not any("bad" in row for row in chosen):
         return ""
     drawn = error_curve_figure(
         chosen,
         title="What a threshold on the confidence buys, and what it costs",
-        threshold=THRESHOLD_PX,
+        threshold=THRESHOLD,
         others=matcher_points(found.compared, len(_tallies(found))),
     )
     names = ("invalid", "bad")

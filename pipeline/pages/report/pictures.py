@@ -31,9 +31,9 @@ _OWN = {
     SKY.lower(): "var(--sky)",
     QUIET.lower(): "var(--back)",
 }
-"""Colours of charts, and those of the page that they become."""
+"""Colours of charts, and the page's colours that replace them."""
 _LEVELS = 254
-"""Colours of a map, beside those of none and of unknown."""
+"""Number of colours of a map, without the two for no value and unknown truth."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Picture:
     """A picture with its legend.
 
     Attributes:
-        title: what it is.
+        title: what the picture shows.
         source: a ``data:`` address.
         legend: what its colours mean.
     """
@@ -111,7 +111,7 @@ def svg(figure: Any, label: str) -> Html:  # noqa: ANN401
 
     Args:
         figure: a Matplotlib figure.
-        label: what it shows, for who cannot see it.
+        label: what the chart shows, for readers who cannot see it.
     """
     file = io.BytesIO()
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": label}):

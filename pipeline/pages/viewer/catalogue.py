@@ -1,6 +1,6 @@
-"""What a cache holds to look at: scenes, and of each the configurations that its maps were made with.
+"""List what a cache has to look at: scenes, and for each the configurations its maps were made with.
 
-Read off the records alone. An entry names what it was made from by the digest of its content, so going up from a
+Only the records are read. An entry names what it was made from by the digest of its content, so going up from a
 confidence or a disparity finds everything behind it, whatever dataset or command made it.
 """
 
@@ -15,18 +15,18 @@ from semidense.pipeline.results.provenance import Provenance, single_inputs
 from semidense.pipeline.results.text import value_text
 
 _ENDS = ("confidence", "disparity")
-"""Products that a configuration ends with."""
+"""The last product of a configuration: a confidence, or a disparity without one."""
 Chain = dict[str, Entry]
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """What one setting of everything made of a scene.
+    """The products of a scene that were made with one set of settings.
 
     Attributes:
-        name: what sets it apart from the others of the scene, and when it was made.
+        name: the settings in which it differs from the scene's other configurations, and when it was made.
         entries: its products, by name; the truth among them, if it is known.
-        further: what was made from them, the first first: filtered maps, figures, other matchers and measures.
+        further: what was made from its products, oldest first: filtered maps, figures, other matchers and measures.
     """
 
     name: str
@@ -44,7 +44,7 @@ class CatalogueScene:
     """A scene of a cache; two pairs of images of one name are two scenes.
 
     Attributes:
-        dataset: as the cache's records name it.
+        dataset: its name in the records.
         name: of the scene.
         configurations: the latest first.
     """
@@ -71,7 +71,7 @@ def catalogue(store: Store) -> tuple[CatalogueScene, ...]:
 
 
 def _numbered(places: Iterable[tuple[str, str, str]]) -> dict[tuple[str, str, str], tuple[str, str]]:
-    """Return dataset and name of each pair of images, with the start of its digest where a name is taken twice."""
+    """Return dataset and name of each pair of images; two pairs of one name get the start of their digests."""
     every = list(places)
     alike = [place[:2] for place in every]
     return {
@@ -113,7 +113,7 @@ class _Records:
         return {"truth": truth} if truth else {}
 
     def further(self, chain: Chain) -> tuple[Entry, ...]:
-        """Return what was made from the products of a scene and from nothing else but of all training scenes."""
+        """Return what was made from a scene's products, from each other, and from learnt products, oldest first."""
         known = {(product, entry.digest) for product, entry in chain.items()}
         found: dict[str, Entry] = {}
         waiting = [content for content in known if not self._is_learnt(content)]

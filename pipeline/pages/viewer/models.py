@@ -23,7 +23,7 @@ from semidense.pipeline.pages.viewer.panels import (
 from semidense.stages.metrics.errors import MASKS, THRESHOLDS
 
 SWIPED = ("kept at R", "raw disparity", "error", "confidence")
-"""What two configurations can be compared by."""
+"""Maps by which two configurations can be compared."""
 _FIGURES = ("R", "invalid", "bad", "avgerr", "rms")
 
 
@@ -151,14 +151,14 @@ class Panels:
         )
 
     def disparity_scales(self, low: float, high: float) -> None:
-        """Give all maps of disparities the same colours, so that they compare."""
+        """Give all disparity maps one scale of colours, so that they can be compared."""
         for panel in (self.maps["truth"], self.maps["raw"], self.maps["kept"], self.swiped):
             panel.scale(low, high)
         self.seen_scale.update(low=low, high=high)
 
 
 def connect(controls: Controls, sources: Sources, panels: Panels) -> list[CustomJS]:
-    """Join what runs in the browser: the filter, the swipe, and the frame; return what has to run at the start."""
+    """Connect the callbacks that run in the browser: filter, swipe and frame; return the one that runs at the start."""
     base = {"slider": controls.R, "base": sources.base}
     keep = CustomJS(
         args={**base, "kept": sources.kept, "table": sources.table, "point": sources.point, "told": panels.told},

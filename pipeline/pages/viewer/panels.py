@@ -48,7 +48,7 @@ pre { overflow-x: auto; background: #f3f5f8; padding: .6rem; }
 summary { cursor: pointer; color: #0072b2; }
 """
 WIDE = ":host { grid-column: span 2; } @media (max-width: 44rem) { :host { grid-column: auto; } }"
-"""Takes two places of the grid where there are several."""
+"""A style: the panel takes two columns of the grid if there are several."""
 _BLANK = np.full((1, 1), np.nan, np.float32)
 
 
@@ -64,7 +64,7 @@ def mapper(colours: Colormap, low: float, high: float) -> LinearColorMapper:
 
 
 def error_mapper() -> LinearColorMapper:
-    """Return the colours of the classes of errors; below the first class is what cannot be known."""
+    """Return the colours of the classes of errors; pixels of unknown truth lie below the first class."""
     return LinearColorMapper(
         palette=list(ERROR_COLOURS), low=-0.5, high=len(ERROR_COLOURS) - 0.5, nan_color=NONE, low_color=UNKNOWN
     )
@@ -90,14 +90,14 @@ class Frame:
             range_.update(start=start, end=end, reset_start=start, reset_end=end)
 
     def whole(self) -> CustomJS:
-        """Return what shows the whole image again, in the browser."""
+        """Return the browser's callback that shows the whole image again."""
         return CustomJS(
             args={"x": self.x, "y": self.y},
             code="for (const r of [x, y]) r.setv({start: r.reset_start, end: r.reset_end})",
         )
 
     def closer(self, factor: float) -> CustomJS:
-        """Return what brings the middle of the picture nearer by a factor, in the browser."""
+        """Return the browser's callback that zooms by a factor around the middle of the picture."""
         code = """for (const r of [x, y]) {
             const middle = (r.start + r.end) / 2, half = (r.end - r.start) / 2 / factor
             r.setv({start: middle - half, end: middle + half})
@@ -111,7 +111,7 @@ class MapPanel:
 
     Attributes:
         plot: the figure.
-        glyphs: the pictures in it; several where the colours can be those of different quantities.
+        glyphs: the pictures in it, one for each scale of colours that it can have.
         title: text above.
         legend: text below.
         box: all of it.

@@ -1,4 +1,4 @@
-"""What the two networks see of a pixel, and what the first one says: read from the few chunks around it."""
+"""Read the costs of a pixel and the patches that the two networks see, from the few chunks around it."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""What is shown of a pixel: its cost curve, and the patches that the two networks see."""
+"""Show a pixel: its cost curve, and the patches that the two networks see."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -116,7 +116,7 @@ def show_evaluation(
 
 
 def told_pixel(pixel: tuple[int, int], values: Mapping[str, float], curve: CostCurve | None) -> str:
-    """Return what is known of a pixel, in words."""
+    """Return disparity, confidence and truth of a pixel as a sentence."""
     y, x = pixel
     parts = [f"y = {y}, x = {x}"]
     raw, truth = values.get("disparity", np.nan), values.get("truth", np.nan)

@@ -1,4 +1,4 @@
-"""The products behind a configuration: what made them, from what, when, and how to open them."""
+"""List the products of a configuration: what made them, from what, when, and how to open them."""
 
 from semidense.cache import Entry, Store
 from semidense.cache.keys.recipe import short
@@ -9,7 +9,7 @@ from semidense.pipeline.results.text import bytes_text, opening_text, time_text,
 
 
 def provenance_table(chosen: Configuration, store: Store) -> Html:
-    """Return each product of a configuration, with everything that its record tells folded below it."""
+    """Return a table of a configuration's products, and below it each record, folded."""
     entries = sorted(chosen.entries.items(), key=lambda item: place(item[0]))
     rows = [
         [

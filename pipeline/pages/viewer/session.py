@@ -25,13 +25,13 @@ from semidense.pipeline.pages.viewer.pixel_panel import (
 from semidense.pipeline.pages.viewer.provenance import provenance_table
 
 NOTHING = "nothing"
-"""Stands for no second configuration."""
+"""The choice of no second configuration."""
 _UNKNOWN = -2.0
 """The class of a pixel whose truth is not known: below all classes."""
 
 
 class Session:
-    """What one browser looks at.
+    """The choices and panels of one browser.
 
     Attributes:
         document: Bokeh's.
@@ -134,7 +134,7 @@ class Session:
         self.panels.problem.visible = bool(problem)
 
     def _show_maps(self, maps: SceneMaps) -> None:
-        """Put the maps of the scene into the panels; those of what is not cached are left out."""
+        """Put the scene's cached maps into the panels; the other panels stay hidden."""
         height, width = maps.size
         self.panels.frame.fit(height, width)
         for panel in (*self.panels.maps.values(), self.panels.swiped):
@@ -229,7 +229,7 @@ class Session:
         clear_pixel(self.panels)
 
     def show_pixel(self) -> None:
-        """Show what is cached of the pixel that is set: its costs, and what the networks see of it."""
+        """Show the chosen pixel: its costs, and the patches that the networks see; only cached products are shown."""
         y, x = self.controls.y.value, self.controls.x.value
         if self.chosen is None or y is None or x is None:
             return
@@ -278,7 +278,7 @@ def _rgba(view: NDArray[np.uint8]) -> NDArray[np.uint32]:
 
 
 def _columns(maps: SceneMaps) -> dict[str, list[NDArray[np.float32]]]:
-    """Return the maps that are filtered and compared; what is not cached has no value anywhere."""
+    """Return the maps that are filtered and compared; a map that is not cached is NaN everywhere."""
     shape = next(each.shape[:2] for each in (maps.disparity, maps.left) if each is not None)
     none = np.full(shape, np.nan, np.float32)
     error, classes = maps.error(), none

@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 
-from semidense.pipeline.comparison.figures import lighting_difference, untextured_share
+from semidense.pipeline.comparison.figures import (
+    density_figure,
+    dots_figure,
+    lighting_difference,
+    untextured_share,
+)
+from semidense.pipeline.results.metric_rows import mean_rows
 
 
 @pytest.mark.parametrize(
@@ -18,3 +24,28 @@ def test_texture_is_a_step_between_neighbours(gray: np.ndarray, share: float) ->
 
 def test_lighting_is_the_difference_of_the_mean_grays() -> None:
     assert lighting_difference({"moments": np.array([[100.0, 9], [130, 4]])}) == 30
+
+
+def row(experiment: str, scene: str, method: str, **figures: float) -> dict[str, object]:
+    place = {"experiment": experiment, "scene": scene, "method": method, "mask": "nonocc", "threshold_px": 1.0}
+    return place | {"pixels": 9} | figures
+
+
+def test_a_method_that_lacks_a_scene_has_dots_and_no_bar() -> None:
+    rows = [
+        row("auc", "a", "ours", auc=0.2, auc_optimal=0.1),
+        row("auc", "b", "ours", auc=0.4, auc_optimal=0.2),
+        row("auc", "a", "other", auc=0.3, auc_optimal=0.1),
+    ]
+    axes = dots_figure(rows, "auc", title="Areas").axes[0]
+    assert [bar.get_width() for bar in axes.patches] == pytest.approx([0.3, 0])
+    assert [list(line.get_xdata()) for line in axes.lines[:2]] == [[0.2, 0.4], [0.3]]
+    assert list(axes.lines[2].get_xdata()) == pytest.approx([0.15, 0.15])
+
+
+def test_a_matcher_that_lacks_a_scene_is_no_point_beside_our_curve() -> None:
+    ours = [row("curve", scene, "ours", R=R, invalid=10 * R, bad=1 - R) for scene in "ab" for R in (0.0, 0.5)]
+    others = [row("density", scene, "all", invalid=5.0, bad=2.0) for scene in "ab"]
+    axes = density_figure(mean_rows([*ours, *others, row("density", "a", "few", invalid=5.0, bad=2.0)])).axes[0]
+    labels = [line.get_label() for line in axes.lines]
+    assert "all" in labels and "few" not in labels

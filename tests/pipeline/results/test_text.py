@@ -1,0 +1,39 @@
+from pathlib import Path
+
+import pytest
+
+from semidense.pipeline.results.result import Result
+from semidense.pipeline.results.text import bytes_text, opening_text, time_text, value_text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        pytest.param("fast", "fast", id="text"),
+        pytest.param(0.9, "0.9", id="number"),
+        pytest.param(False, "false", id="as --set takes it"),
+        pytest.param(None, "null", id="open"),
+        pytest.param(["gray", "rank"], "gray,rank", id="list"),
+        pytest.param(list(range(9)), "0 and 8 more", id="long list"),
+        pytest.param("ab" * 32, "abababababab", id="hash"),
+        pytest.param(["ab" * 32] * 4, "abababababab and 3 more", id="many hashes"),
+    ],
+)
+def test_a_value_is_short_and_readable(value: object, text: str) -> None:
+    assert value_text(value) == text
+
+
+def test_a_time_is_told_to_the_second() -> None:
+    assert time_text("2026-11-28T16:03:17.123456+00:00") == "2026-11-28 16:03:17"
+
+
+def test_bytes_have_a_unit() -> None:
+    assert [bytes_text(count) for count in (999, 999_600, 47_700_000)] == ["999 B", "1 MB", "47.7 MB"]
+
+
+def test_the_code_that_opens_a_product_opens_it(trained: Result) -> None:
+    made = trained.find("disparity", "test-0")
+    imports, _, opening = opening_text(Path(trained.store.root), made.key).partition("; ")
+    names: dict[str, object] = {}
+    exec(imports, names)
+    assert eval(opening, names).attrs["key"] == made.key
