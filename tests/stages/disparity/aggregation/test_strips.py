@@ -33,7 +33,7 @@ def test_by_hand() -> None:
     """One row of three pixels, d = 0, 1, 2. P1 = 1 and P2 = 2 are 8 and 16 levels, and 2 and 4 over the edge."""
     costs = np.float16([[[0, N, N], [1, 0, N], [5, 5, 0]]])
     gray = np.uint8([[100, 100, 200]])
-    params = AggregatedParams(p1=1, p2=2)
+    params = AggregatedParams(p1=1, p2=2, edge_divisor=4)
     own = [(0, 0, 0), (8, 0, 4), (40, 40, 0)]  # cells outside the image have the mean of the pixel's others
     # From the left. Second pixel: its own costs, since the first one's are all 0. Third, over the edge, d = 0:
     # min(8, 0 + 2, 0 + 4) = 2; d = 1: 0; d = 2: min(4, 0 + 2, 0 + 4) = 2.
