@@ -1,3 +1,4 @@
+import tracemalloc
 from collections.abc import Sequence
 
 import numpy as np
@@ -115,6 +116,32 @@ def test_never_more_than_a_strip_is_read(rows: int, expected: Sequence[tuple[int
     strips = [strip.rows for strip in aggregate(volume, gray, 0, AggregatedParams(), rows)]
     assert volume.read == list(expected)
     assert [strip.start for strip in strips] == sorted({start for start, _ in expected}, reverse=True)
+
+
+class Endless:
+    """A volume of any height that repeats its rows."""
+
+    def __init__(self, rows: np.ndarray, height: int) -> None:
+        self.rows, self.shape = rows, (height, *rows.shape[1:])
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        return self.rows[np.arange(rows.start, rows.stop) % len(self.rows)]
+
+
+def test_memory_holds_a_strip_and_the_paths_between_strips() -> None:
+    """Of 1024 rows, some 3 x 32 are held in strips, and 4 for each of 32 strips between them."""
+    costs, _ = pair((32, 60, 40))
+    volume = Endless(costs, 1024)
+    gray = np.zeros(volume.shape[:2], np.uint8)
+    next(aggregate(volume, gray, 0, AggregatedParams(), 32))  # compiles
+    tracemalloc.start()
+    try:
+        for _ in aggregate(volume, gray, 0, AggregatedParams(), 32):
+            pass
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 0.35 * 1024 * 60 * 40 * costs.itemsize
 
 
 @pytest.mark.parametrize("width", [1, 100, 3000, 100_000])
