@@ -11,6 +11,7 @@ NAMES = (
     "evaluation",
     "cost_volume",
     "guided",
+    "aggregation",
     "roofline",
     "training",
     "growth",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.datasets import Dataset, open_dataset
+from semidense.datasets import Dataset, SceneSource, open_dataset
 from semidense.pipeline.api import Task, carry_out
 from semidense.pipeline.comparison.ablation import ABLATION, ablation_request, ablation_rows
 from semidense.pipeline.comparison.paper_figures import NAMED
@@ -26,10 +26,12 @@ from semidense.pipeline.comparison.rows import (
     raw_rows,
 )
 from semidense.pipeline.execution.watch import Watch
-from semidense.pipeline.plan.config import nearest
+from semidense.pipeline.plan.config import nearest, setting_texts
 from semidense.pipeline.plan.environment import missing_packages
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made
+from semidense.pipeline.plan.presets import DEFAULT
+from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.plan.training_split import training_scenes
 from semidense.pipeline.results.metric_rows import METHOD, mean_rows
 from semidense.pipeline.results.result import Result
@@ -60,6 +62,11 @@ MEASURES = {
     "cost": ("cost_confidence", "msm"),
 }
 """Confidence measures of the raw map, by name: product and array."""
+BESIDE = {
+    "preset robust, single costs": ("use.disparity=disparity", "use.right_disparity=right_disparity"),
+    "preset robust": (),
+}
+"""Settings of the preset ``robust`` that stand beside the default ones, by name: without and with aggregation."""
 _TAUGHT = ("o1", "ccnn")
 """Products that need training scenes; ``--train-on`` names them."""
 _ALWAYS = ("images", "truth", "disparity", "confidence")
@@ -151,10 +158,20 @@ def compare(
     if "raw" in experiments and not _no_ablation(bool(training), without):
         ablation = ablation_request(task, dataset, training)
         rows += ablation_rows(carry_out(task, ablation, (), watch, scheduler, workers))
+    for name, wanted in _beside(task, dataset, training):
+        rows += _named(_rows(carry_out(task, wanted, (), watch, scheduler, workers), experiments), name)
     for protocol, wanted in lenient:
         trained = carry_out(task, wanted, (), watch, scheduler, workers)
         rows += _named(_rows(trained, experiments), PROTOCOLS[protocol])
     return Comparison(rows, unavailable, (*notes, *result.plan.notes), result)
+
+
+def _beside(task: Task, dataset: Dataset, training: tuple[SceneSource, ...]) -> Iterator[tuple[str, Request]]:
+    """Yield the requests of ``BESIDE`` with the task's settings; nothing if the task has a preset of its own."""
+    for name, settings in BESIDE.items() if task.preset == DEFAULT else ():
+        other = dataclasses.replace(task, preset="robust", settings=(*settings, *setting_texts(task.settings)))
+        request = other.request("semidense")
+        yield name, dataclasses.replace(request, dataset=dataset, training=training, also=_ALWAYS)
 
 
 def _require(task: Task, experiments: Sequence[str]) -> None:
@@ -237,11 +254,11 @@ def _rows(result: Result, experiments: Sequence[str]) -> Iterator[Row]:
             yield from _EXPERIMENT[experiment](judged, products, made["semidense"].step.R)
 
 
-def _named(rows: Iterable[Row], protocol: str) -> Iterator[Row]:
-    """Yield the rows of networks trained by a protocol, under its name; without the curve, which is dual-cnn's only."""
+def _named(rows: Iterable[Row], name: str) -> Iterator[Row]:
+    """Yield rows under the name of a protocol or a preset; the curve stays that of the task's own settings."""
     for row in rows:
         if row["experiment"] != "curve":
-            yield row | {"method": f"{row['method'].removesuffix(_SHIPPED)}, {protocol}"}
+            yield row | {"method": f"{row['method'].removesuffix(_SHIPPED)}, {name}"}
 
 
 def _raw(judged: Judged, products: Mapping[str, Arrays], _: float | None) -> Iterator[Row]:

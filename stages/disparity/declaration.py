@@ -35,15 +35,15 @@ class AggregatedParams(Params):
 
     paths: Literal[8, 16] = Field(8, description="directions that costs are summed along")
     p1: float = Field(
-        16, ge=0, le=400, description="penalty of a step of 1 px along a path, log-odds; larger: smoother surfaces"
+        24, ge=0, le=400, description="penalty of a step of 1 px along a path, log-odds; larger: smoother surfaces"
     )
     p2: float = Field(
-        128, ge=0, le=400, description="penalty of a larger step, log-odds; larger: fewer jumps and fewer small objects"
+        192, ge=0, le=400, description="penalty of a larger step, log-odds; larger: fewer jumps and fewer small objects"
     )
     edge_step: int = Field(
         6, ge=0, le=255, description="pixels whose gray differs by more levels of 255 have an edge between them"
     )
-    edge_divisor: float = Field(4, ge=1, le=1000, description="both penalties are divided by it at an edge")
+    edge_divisor: float = Field(8, ge=1, le=1000, description="both penalties are divided by it at an edge")
     subpixel: bool = Field(True, description="refine by a parabola through three summed costs")
 
     @model_validator(mode="after")

@@ -93,7 +93,7 @@ def _evidence(
         if best == NONE:
             continue
         first, end = ends(x, width, d_min, depth)
-        alone = first_least(single[x], first, end)
+        alone = first_least(single, x, first, end)
         low, low_sum = single[x, alone], aggregated[x, best]
         rival = _rival(single[x], alone, first, end, np.int16(low + CAP))
         rival_sum = _rival(aggregated[x], best, first, end, np.uint16(low_sum + paths * CAP))

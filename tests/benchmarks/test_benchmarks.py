@@ -11,6 +11,7 @@ import pytest
 import torch
 
 from benchmarks import (
+    aggregation,
     agreement,
     cost_volume,
     growth,
@@ -40,6 +41,10 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.chdir(tmp_path)
 
 
+def aggregation_on_little() -> None:
+    aggregation.main(shrink=8)
+
+
 def growth_on_little() -> None:
     growth.main(shrink=4, pairs=1)
 
@@ -59,6 +64,7 @@ def workers_on_little() -> None:
 @pytest.mark.parametrize(
     ("run", "name", "told"),
     [
+        pytest.param(aggregation_on_little, "aggregation", "peak of aggregation", id="aggregation"),
         pytest.param(growth_on_little, "growth", "time a cell", id="growth"),
         pytest.param(memory_on_little, "memory", "peak of a run", id="memory"),
         pytest.param(training_on_little, "training", "times patches", id="training"),

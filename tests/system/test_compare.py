@@ -13,7 +13,7 @@ from semidense.datasets import open_dataset
 from semidense.pipeline import compare
 from semidense.pipeline.api import Task
 from semidense.pipeline.comparison.ablation import ABLATION
-from semidense.pipeline.comparison.experiments import EXPERIMENTS, LOWERED, MATCHERS, MEASURES, Comparison
+from semidense.pipeline.comparison.experiments import BESIDE, EXPERIMENTS, LOWERED, MATCHERS, MEASURES, Comparison
 from semidense.pipeline.comparison.files import COLUMNS, write_comparison
 from semidense.pipeline.comparison.paper_figures import NAMED, QUOTED
 from semidense.pipeline.comparison.protocols import protocol_requests
@@ -50,9 +50,28 @@ def methods(found: Comparison, experiment: str) -> set[str]:
 def test_every_method_that_can_run_has_its_rows(found: Comparison) -> None:
     matchers = {method for method, product in MATCHERS.items() if installed(product)}
     lowered = {LOWERED} if "MC-CNN accurate" in matchers else set()
-    assert methods(found, "raw") == matchers | lowered | {"dual-cnn, shipped weights"} | set(ABLATION)
-    assert methods(found, "density") == matchers | {"dual-cnn"}
-    assert methods(found, "auc") == {method for method, (product, _) in MEASURES.items() if installed(product)}
+    ours = {f"dual-cnn, {name}" for name in BESIDE}
+    assert methods(found, "raw") == matchers | lowered | {"dual-cnn, shipped weights"} | ours | set(ABLATION)
+    assert methods(found, "density") == matchers | {"dual-cnn"} | ours
+    measures = {method: product for method, (product, _) in MEASURES.items() if installed(product)}
+    own = {f"{each}, {name}" for each, product in measures.items() if product == "confidence" for name in BESIDE}
+    assert methods(found, "auc") == {*measures} | own
+
+
+def test_the_preset_robust_stands_beside_the_default_one(found: Comparison, task: Task) -> None:
+    """Its row is what a comparison of the preset itself finds, which has no such rows."""
+    own = compare(replace(task, preset="robust", scenes=["test-0"]), ("raw", "density"))
+    assert not any("preset" in row["method"] for row in own.rows)
+    for experiment, method in (("raw", "dual-cnn, shipped weights"), ("density", "dual-cnn")):
+        rows, beside = (
+            [
+                {name: value for name, value in row.items() if name != "method"}
+                for row in each.rows
+                if (row["experiment"], row["method"]) == (experiment, wanted)
+            ]
+            for each, wanted in ((own, method), (found, "dual-cnn, preset robust"))
+        )
+        assert rows and rows == beside
 
 
 def test_training_scenes_are_not_compared_on(found: Comparison) -> None:
@@ -90,6 +109,8 @@ def test_a_second_comparison_computes_nothing_and_says_the_same(found: Compariso
 def test_the_report_shows_what_is_cached_and_says_the_same(found: Comparison, task: Task, tmp_path: Path) -> None:
     page = report(task, tmp_path / "report.html").read_text()
     for row in (row for row in found.rows if row["mask"] == "nonocc" and row["threshold_px"] == 1):
+        if "preset" in row["method"]:  # other settings: a report of the task shows its own
+            continue
         if row["experiment"] == "auc":
             assert row["method"] in page and f'<td class="number">{row["auc"]:.4f}</td>' in page
         if row["experiment"] == "density" and "R" not in row:

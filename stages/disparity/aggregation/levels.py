@@ -99,17 +99,17 @@ def _fill(
             for d in range(depth):
                 cost = np.int32(above[y, x, d]) - np.int32(low)  # the difference of two levels may not fit 16 bits
                 above[y, x, d] = np.int16(NOT_JUDGED if above[y, x, d] == NO_COST else min(cost, np.int32(CAP)))
-            _fill_outside(above[y, x], *ends(x, width, d_min, depth))
+            first, end = ends(x, width, d_min, depth)
+            if 0 < end - first < depth:
+                _fill_outside(above[y, x], first, end)
 
 
 @kernel
 def _fill_outside(above: NDArray[np.int16], first: int, end: int) -> None:
     """Give the cells whose right pixel is outside the image the mean of the others."""
-    count = end - first
-    if 0 < count < above.size:
-        total = 0
-        for d in range(first, end):
-            total += above[d]
-        mean = np.int16((total + count // 2) // count)
-        above[:first] = mean
-        above[end:] = mean
+    count, total = end - first, 0
+    for d in range(first, end):
+        total += above[d]
+    mean = np.int16((total + count // 2) // count)
+    above[:first] = mean
+    above[end:] = mean

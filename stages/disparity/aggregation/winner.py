@@ -41,13 +41,16 @@ def parabola(strip: Strip, index: NDArray[np.int32]) -> NDArray[np.float32]:
 
 
 @kernel
-def first_least(costs: NDArray[Any], first: int, end: int) -> int:
-    """Return the index of the first least of some costs; there must be one at least."""
-    low = costs[first]
+def first_least(costs: NDArray[Any], x: int, first: int, end: int) -> int:
+    """Return the index of the first least of a pixel's costs; there must be one at least.
+
+    The pixel is one of a row, (x, d): to cut it out would take as long as to look through it.
+    """
+    low = costs[x, first]
     for d in range(first, end):
-        low = min(low, costs[d])
+        low = min(low, costs[x, d])
     best = first
-    while costs[best] != low:
+    while costs[x, best] != low:
         best += 1
     return best
 
@@ -57,10 +60,11 @@ def _least(aggregated: NDArray[np.uint16], least: NDArray[np.int16], d_min: int,
     """Write the index of each pixel's winner."""
     height, width, depth = aggregated.shape
     for y in range(height):
+        row = aggregated[y]
         for x in range(width):
             first, end = ends(x, width, d_min, depth)
             found = first < end and least[y, x] != NO_COST
-            index[y, x] = first_least(aggregated[y, x], first, end) if found else NONE
+            index[y, x] = first_least(row, x, first, end) if found else NONE
 
 
 @kernel

@@ -1,3 +1,4 @@
+import tracemalloc
 from collections.abc import Sequence
 
 import numpy as np
@@ -33,7 +34,7 @@ def test_by_hand() -> None:
     """One row of three pixels, d = 0, 1, 2. P1 = 1 and P2 = 2 are 8 and 16 levels, and 2 and 4 over the edge."""
     costs = np.float16([[[0, N, N], [1, 0, N], [5, 5, 0]]])
     gray = np.uint8([[100, 100, 200]])
-    params = AggregatedParams(p1=1, p2=2)
+    params = AggregatedParams(p1=1, p2=2, edge_divisor=4)
     own = [(0, 0, 0), (8, 0, 4), (40, 40, 0)]  # cells outside the image have the mean of the pixel's others
     # From the left. Second pixel: its own costs, since the first one's are all 0. Third, over the edge, d = 0:
     # min(8, 0 + 2, 0 + 4) = 2; d = 1: 0; d = 2: min(4, 0 + 2, 0 + 4) = 2.
@@ -115,6 +116,32 @@ def test_never_more_than_a_strip_is_read(rows: int, expected: Sequence[tuple[int
     strips = [strip.rows for strip in aggregate(volume, gray, 0, AggregatedParams(), rows)]
     assert volume.read == list(expected)
     assert [strip.start for strip in strips] == sorted({start for start, _ in expected}, reverse=True)
+
+
+class Endless:
+    """A volume of any height that repeats its rows."""
+
+    def __init__(self, rows: np.ndarray, height: int) -> None:
+        self.rows, self.shape = rows, (height, *rows.shape[1:])
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        return self.rows[np.arange(rows.start, rows.stop) % len(self.rows)]
+
+
+def test_memory_holds_a_strip_and_the_paths_between_strips() -> None:
+    """Of 1024 rows, some 3 x 32 are held in strips, and 4 for each of 32 strips between them."""
+    costs, _ = pair((32, 60, 40))
+    volume = Endless(costs, 1024)
+    gray = np.zeros(volume.shape[:2], np.uint8)
+    next(aggregate(volume, gray, 0, AggregatedParams(), 32))  # compiles
+    tracemalloc.start()
+    try:
+        for _ in aggregate(volume, gray, 0, AggregatedParams(), 32):
+            pass
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 0.35 * 1024 * 60 * 40 * costs.itemsize
 
 
 @pytest.mark.parametrize("width", [1, 100, 3000, 100_000])
