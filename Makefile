@@ -8,7 +8,7 @@ ifeq ($(filter exact guided,$(MODE)),)
 $(error MODE=$(MODE): the weights that come with the package are of exact and of guided volumes)
 endif
 
-.PHONY: demo test lint train descriptors evaluation calibration bench faults wheel clean
+.PHONY: demo test lint train descriptors evaluation calibration bench faults silence wheel clean
 
 demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
 	$(BIN)/pipeline run motorcycle --output demo
@@ -53,6 +53,9 @@ bench: $(READY)  ## DATA=DIR (optional): every benchmark of speed, bfloat16 agai
 
 faults: $(READY)  ## inject every fault of the matrix, and put the outcome where README.md and docs/cache.md quote it
 	$(BIN)/python -m tests.faults --json docs/faults.json --quote
+
+silence: $(READY)  ## paint 200 regions without information into a real pair: at most 1 % of each may be kept
+	SILENCE_DRAWS=200 $(BIN)/python -m pytest tests/system/test_silence.py
 
 wheel: $(READY)
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir dist .

@@ -11,6 +11,7 @@ from semidense.stages.stage import Array
 _EQUAL = 0.99
 _NEARLY_ALL = 0.9
 _TAIL = 15
+_SILENT = 0.01
 _LEAST_OFFSET = 1.0
 """A vertical offset below this does no harm: a patch is 11 px high."""
 
@@ -31,6 +32,21 @@ def findings(survey: Mapping[str, Array], searched: DisparityRange | None, doffs
         return [f"only {matches['y'].size} places agree between the views: are they of the same scene, and rectified?"]
     step = float(survey["step"][0])
     return [*_exchanged(matches["disparity"], step, searched, doffs), *_unrectified(matches["vertical"], step)]
+
+
+def without_texture(distinctiveness: Mapping[str, Array]) -> list[str]:
+    """Return a line that names the share of the left view without texture along its rows; none below 1 %.
+
+    Args:
+        distinctiveness: the product's arrays.
+    """
+    share = float(np.mean(distinctiveness["left"] < 1))
+    if share < _SILENT:
+        return []
+    return [
+        f"{100 * share:.0f} % of the left view is blank or repeats itself along its rows: no disparity can be found "
+        "there, and the confidence is 0"
+    ]
 
 
 def _exchanged(disparity: Array, step: float, searched: DisparityRange | None, doffs: float) -> Iterator[str]:
