@@ -8,7 +8,7 @@ ifeq ($(filter exact guided,$(MODE)),)
 $(error MODE=$(MODE): the weights that come with the package are of exact and of guided volumes)
 endif
 
-.PHONY: demo test lint train descriptors evaluation calibration bench faults wheel clean
+.PHONY: demo test lint train descriptors evaluation evidence calibration bench faults silence wheel clean
 
 demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
 	$(BIN)/pipeline run motorcycle --output demo
@@ -40,6 +40,12 @@ evaluation: $(READY)  ## DATA=DIR MODE=guided: train the evaluation-Net of such 
 		--set 'training.shipped=["matching_net", "descriptor_net"]' --output build/$(MODE)
 	cp build/$(MODE)/evaluation_net.safetensors stages/weights/evaluation_net$(OF_MODE).safetensors
 
+evidence: $(READY)  ## DATA=DIR: train what weighs the evidence of the preset robust, and put its weights in place
+	@test -n "$(DATA)" || { echo "make evidence: say where the Middlebury sets are: make evidence DATA=DIR"; exit 2; }
+	$(BIN)/pipeline run middlebury:$(DATA) --preset robust --train --upto evidence_net --output build/robust \
+		--set 'training.shipped=["matching_net", "descriptor_net", "evaluation_net"]'
+	cp build/robust/evidence_net.safetensors stages/weights/
+
 calibration: $(READY)  ## DATA=DIR MODE=guided: measure on the same scenes what its confidence is worth, put the table in place
 	@test -n "$(DATA)" || { echo "make calibration: say where the Middlebury sets are: make calibration DATA=DIR"; exit 2; }
 	$(BIN)/pipeline run middlebury:$(DATA) --train --upto calibration --set costvolume.mode=$(MODE) --output build/$(MODE)
@@ -53,6 +59,9 @@ bench: $(READY)  ## DATA=DIR (optional): every benchmark of speed, bfloat16 agai
 
 faults: $(READY)  ## inject every fault of the matrix, and put the outcome where README.md and docs/cache.md quote it
 	$(BIN)/python -m tests.faults --json docs/faults.json --quote
+
+silence: $(READY)  ## paint 200 regions without information into a real pair: at most 1 % of each may be kept
+	SILENCE_DRAWS=200 $(BIN)/python -m pytest tests/system/test_silence.py
 
 wheel: $(READY)
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir dist .

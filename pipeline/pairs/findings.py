@@ -11,6 +11,7 @@ from semidense.stages.stage import Array
 _EQUAL = 0.99
 _NEARLY_ALL = 0.9
 _TAIL = 15
+_SILENT = 0.01
 _LEAST_OFFSET = 1.0
 """A vertical offset below this does no harm: a patch is 11 px high."""
 
@@ -34,6 +35,21 @@ def findings(
     return [
         *_exchanged(matches["disparity"], step, searched, known.doffs if known else 0.0),
         *_unrectified(matches["vertical"], step),
+    ]
+
+
+def without_texture(distinctiveness: Mapping[str, Array]) -> list[str]:
+    """Return a line that names the share of the left view without texture along its rows; none below 1 %.
+
+    Args:
+        distinctiveness: the product's arrays.
+    """
+    share = float(np.mean(distinctiveness["left"] < 1))
+    if share < _SILENT:
+        return []
+    return [
+        f"{100 * share:.0f} % of the left view is blank or repeats itself along its rows: no disparity can be found "
+        "there, and the confidence is 0"
     ]
 
 

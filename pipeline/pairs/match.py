@@ -15,7 +15,7 @@ from semidense.datasets.pairs.arrays import array_pair
 from semidense.datasets.pairs.options import PairOptions, pair_spec
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.execution.watch import Watch
-from semidense.pipeline.pairs.findings import findings
+from semidense.pipeline.pairs.findings import findings, without_texture
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.presets import DEFAULT
@@ -208,9 +208,12 @@ class Match:
 
     @property
     def warnings(self) -> list[str]:
-        """What looks wrong with the pair: its files, its calibration, or exchanged, unrectified or identical views."""
+        """What looks wrong with the pair: files, calibration, or exchanged, unrectified, identical or blank views."""
         searched = None if self.scene.open_ends else self.disparities
-        return [*self.scene.warnings, *findings(self.survey, searched, self.scene.calibration)]
+        found = findings(self.survey, searched, self.scene.calibration)
+        views = self._find("distinctiveness")
+        blank = without_texture(self.result.store.read(views.key)) if views else ()
+        return [*self.scene.warnings, *found, *blank]
 
     def made(self, product: str) -> Made:
         """Return the result of one of the pair's products.
@@ -218,11 +221,16 @@ class Match:
         Raises:
             UsageError: if it was not made.
         """
-        for result in (self.result, *self.others):
-            for each in result.made.values():
-                if each.step.product == product and each.step.scene in (self.scene.name, SPLIT):
-                    return each
-        raise UsageError(f"{product} of {self.scene.name} was not asked for")
+        found = self._find(product)
+        if found is None:
+            raise UsageError(f"{product} of {self.scene.name} was not asked for")
+        return found
+
+    def _find(self, product: str) -> Made | None:
+        """Return the result of one of the pair's products; None if it was not made."""
+        made = (each for result in (self.result, *self.others) for each in result.made.values())
+        own = (self.scene.name, SPLIT)
+        return next((each for each in made if each.step.product == product and each.step.scene in own), None)
 
     def _array(self, product: str, name: str) -> NDArray[Any]:
         return np.asarray(self.result.store.arrays(self.made(product).key)[name][...])

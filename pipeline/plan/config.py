@@ -40,7 +40,7 @@ class TrainingParams(Params):
     dataset: str | None = Field(
         None, description="dataset whose training scenes are used; default: the dataset of the run"
     )
-    shipped: tuple[Literal["matching_net", "descriptor_net"], ...] = Field(
+    shipped: tuple[Literal["matching_net", "descriptor_net", "evaluation_net"], ...] = Field(
         (), description="networks that --train does not train but takes from the package"
     )
 

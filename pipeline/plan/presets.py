@@ -8,13 +8,14 @@ PRESETS: Mapping[str, tuple[str, ...]] = {
         "costvolume.mode=fast",
         "use.disparity=aggregated",
         "use.right_disparity=right_aggregated",
+        "use.confidence=evidence_confidence",
     ),
 }
 """The settings of each preset that differ from the defaults.
 
 - ``paper``: the method of the paper: single costs, winner takes all, whole disparities.
 - ``robust``: costs summed along paths before the winner is taken, with sub-pixel disparities: fewer wrong pixels where
-  texture is thin.
+  texture is thin. The confidence weighs what the costs say as well.
 """
 DEFAULT = "paper"
 """The preset of a command that is given none."""

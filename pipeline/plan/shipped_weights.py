@@ -49,13 +49,13 @@ def weights_stage(product: str) -> Stage:
     return Stage(product, (), STAGES[product].outputs, f"{__name__}:read_{form}")
 
 
-def shipped_weights(product: str, mode: Mode) -> Weights:
-    """Return the package's weights of a product for volumes of a mode.
+def shipped_weights(product: str, mode: Mode, confidence: str | None = None) -> Weights:
+    """Return the package's weights of a product for volumes of a mode, and for the product that makes the confidence.
 
     Raises:
         StageError: if this installation has none.
     """
-    name = weights_name(product, mode)
+    name = weights_name(product, mode, confidence)
     return Weights(product, name, None, weights_digest(name))
 
 
@@ -75,12 +75,18 @@ def _bytes_of(product: str, file: Path) -> bytes:
         raise StageError(f"weights.{product} = {file}: {error.strerror or error}") from None
 
 
-def weights_name(product: str, mode: Mode) -> str:
-    """Return the name of a product's shipped weights for volumes of a mode.
+def weights_name(product: str, mode: Mode, confidence: str | None = None) -> str:
+    """Return the name of a product's shipped weights: of a mode's volumes, and of what makes the confidence.
+
+    A calibration says what the numbers of one confidence are worth, and nothing of those of another.
 
     >>> weights_name("evaluation_net", "guided"), weights_name("matching_net", "guided")
     ('evaluation_net.guided', 'matching_net')
+    >>> weights_name("calibration", "fast", "evidence_confidence")
+    'calibration.evidence_confidence'
     """
+    if product == "calibration" and confidence:
+        return f"{product}.{confidence}"
     return f"{product}.guided" if mode == "guided" and product in _LEARNT_FROM_MAPS else product
 
 
@@ -121,6 +127,11 @@ def _missing(name: str) -> str:
     product, _, mode = name.partition(".")
     if product != "calibration":
         return f"no weights for {name} come with this installation: train them with --train"
+    if mode not in ("", "guided"):
+        return (
+            f"no calibration of {mode} comes with this installation: a wanted error and calibrated probabilities need "
+            "one; give R or a density instead, or a calibration of your own (weights.calibration=FILE)"
+        )
     of_mode = f" MODE={mode}" if mode else ""
     return (
         "no calibration of such volumes comes with this installation: a wanted error and calibrated probabilities need "

@@ -272,7 +272,8 @@ class _Builder:
             return own_weights(product, Path(file).expanduser())
         if self.request.train and product not in self.config.training.shipped:
             return None
-        return shipped_weights(product, self.config.of("costvolume", CostVolumeParams).mode)
+        mode = self.config.of("costvolume", CostVolumeParams).mode
+        return shipped_weights(product, mode, self.config.choice("use", "confidence"))
 
     def _chosen(self, product: str) -> tuple[Stage, Params]:
         """Return the stage that makes a product, and its settings: its own, or the one that ``use`` names.

@@ -11,7 +11,7 @@ from semidense.stages.evaluation.agreement import padded_agreement
 from semidense.stages.evaluation.declaration import RADIUS, ConfidenceParams
 from semidense.stages.evaluation.layers import evaluation_layers
 from semidense.stages.evaluation.net import EvaluationNet
-from semidense.stages.evaluation.silence.veto import repetitive, undecided
+from semidense.stages.evaluation.silence.veto import vetoed
 from semidense.stages.learning.parameters import from_vector
 from semidense.stages.stage import Array, Inputs, require_shape
 
@@ -86,14 +86,7 @@ def compute_confidence(params: ConfidenceParams, inputs: Inputs) -> dict[str, ND
     agreeing = padded_agreement(disparity, params.window)
     weighed = weigh_in(log_odds, agreeing, params.agreement, params.typical)
     return {
-        "confidence": np.where(_vetoed(inputs), np.float32(0), weighed) if params.veto else weighed,
+        "confidence": np.where(vetoed(inputs), np.float32(0), weighed) if params.veto else weighed,
         "network": sigmoid(log_odds),
         "agreement": agreeing,
     }
-
-
-def _vetoed(inputs: Inputs) -> NDArray[np.bool_]:
-    """Return where the views or the costs tell no disparity, (y, x)."""
-    views = inputs["distinctiveness"]
-    silent = repetitive(views["left"], views["right"], inputs["disparity"]["disparity"])
-    return silent | undecided(inputs["cost_margin"]["margin"])

@@ -17,6 +17,7 @@ from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 from torch import nn
 
+from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.parameters import count, from_vector, to_vector
 from semidense.stages.matching.descriptors.net import DescriptorNet
@@ -42,7 +43,11 @@ def candidates(product: str) -> list[nn.Module]:
         return [MatchingNet(channels, head) for head in HEADS for channels in range(1, MOST_CHANNELS + 1)]
     if product == "descriptor_net":
         return [DescriptorNet(channels) for channels in range(1, MOST_CHANNELS + 1)]
-    raise StageError(f"{product} is no network: weights are those of matching_net, descriptor_net or evaluation_net")
+    if product == "evidence_net":
+        return [EvidenceNet()]
+    raise StageError(
+        f"{product} is no network: weights are those of matching_net, descriptor_net, evaluation_net or evidence_net"
+    )
 
 
 def save_weights(product: str, arrays: Arrays, metadata: Mapping[str, Any]) -> bytes:

@@ -23,7 +23,7 @@ class DistinctivenessParams(Params):
     share: float = Field(
         0.1, ge=0, le=1, description="mean difference that tells nothing, as a share of the patch's contrast"
     )
-    margin: int = Field(4, ge=0, le=101, description="pixels around such a patch that are held to tell nothing too")
+    margin: int = Field(6, ge=0, le=101, description="pixels around such a patch that are held to tell nothing too")
 
     @field_validator("window")
     @classmethod

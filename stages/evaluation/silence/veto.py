@@ -5,14 +5,25 @@ from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
 from semidense.stages.evaluation.declaration import RADIUS
-from semidense.stages.stage import Array
+from semidense.stages.stage import Array, Inputs
 
 TIED = 0.1
 """Margin below which a rival is as good as the winner, log-odds: what rounding of the costs makes of equal ones."""
-UNDECIDED = 1.0
+UNDECIDED = 0.5
 """Mean margin of the pixels around below which they only seem to have a winner, log-odds: random costs have some."""
 WINDOW = 9
 """Side of the window of that mean, px."""
+
+
+def vetoed(inputs: Inputs) -> NDArray[np.bool_]:
+    """Return where the views or the costs tell no disparity, (y, x), of a block with 50 px of context all round.
+
+    Args:
+        inputs: the products ``distinctiveness``, ``disparity`` and ``cost_margin``.
+    """
+    views = inputs["distinctiveness"]
+    silent = repetitive(views["left"], views["right"], inputs["disparity"]["disparity"])
+    return silent | undecided(inputs["cost_margin"]["margin"])
 
 
 def undecided(margin: NDArray[np.float32]) -> NDArray[np.bool_]:

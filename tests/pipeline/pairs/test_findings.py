@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from semidense.datasets import Calibration, DisparityRange
-from semidense.pipeline.pairs.findings import findings
+from semidense.pipeline.pairs.findings import findings, without_texture
 from semidense.stages.disparity.survey import ENOUGH
 
 
@@ -61,3 +61,13 @@ def test_negative_disparities_that_the_calibration_explains_are_no_surprise(doff
 def test_the_way_out_of_negative_disparities_is_not_only_to_exchange_the_views() -> None:
     (warning,) = findings(survey(-20), None)
     assert "if the cameras are turned towards each other, the smallest and the largest disparity" in warning
+
+
+def test_the_share_without_texture_is_named_from_one_per_cent_on() -> None:
+    views = {"left": np.full((10, 20), 3.0), "right": np.zeros((10, 20))}
+    assert without_texture(views) == []
+    views["left"][0, 0] = 0.5
+    assert without_texture(views) == []
+    views["left"][:5] = 0.5
+    (line,) = without_texture(views)
+    assert line.startswith("50 % of the left view")

@@ -21,6 +21,7 @@ def test_robust_takes_aggregated_maps_of_both_views() -> None:
     config = Config.load(preset="robust")
     assert config.choice("use", "disparity") == "aggregated"
     assert config.choice("use", "right_disparity") == "right_aggregated"
+    assert config.choice("use", "confidence") == "evidence_confidence"
 
 
 def test_a_file_wins_over_the_preset_and_a_setting_over_the_file(tmp_path: Path) -> None:

@@ -21,6 +21,11 @@ def test_missing_weights_say_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_pat
         shipped.weights_file("matching_net")
 
 
+def test_a_calibration_is_of_one_confidence_alone() -> None:
+    with pytest.raises(StageError, match=r"no calibration of evidence_confidence comes .* give R or a density instead"):
+        shipped.shipped_weights("calibration", "fast", "evidence_confidence")
+
+
 def test_weights_are_found_in_the_package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "weights").mkdir()
     (tmp_path / "weights" / "matching_net.safetensors").write_bytes(b"w")

@@ -10,6 +10,7 @@ from safetensors import safe_open
 from safetensors.torch import load, save
 
 from semidense.stages import weights
+from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.parameters import count, to_vector
 from semidense.stages.matching.declaration import Head
@@ -53,6 +54,12 @@ def test_the_round_trip_of_an_evaluation_net_is_exact() -> None:
     vector = np.random.default_rng(0).normal(size=count(EvaluationNet())).astype(np.float32)
     data = save_weights("evaluation_net", {"parameters": vector, "loss": LOSS}, {})
     assert np.array_equal(read_weights("evaluation_net", data)["parameters"], vector)
+
+
+def test_the_round_trip_of_an_evidence_net_is_exact() -> None:
+    vector = np.random.default_rng(0).normal(size=count(EvidenceNet())).astype(np.float32)
+    data = save_weights("evidence_net", {"parameters": vector, "loss": LOSS}, {})
+    assert np.array_equal(read_weights("evidence_net", data)["parameters"], vector)
 
 
 def test_the_number_of_parameters_tells_the_network() -> None:

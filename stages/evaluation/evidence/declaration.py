@@ -1,0 +1,78 @@
+"""Declare the net that weighs the evidence, and the confidence that it gives. Light: it does not load torch."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from semidense.stages.compute.precision import Precision
+from semidense.stages.evaluation.declaration import RADIUS
+from semidense.stages.learning.schedule import SHARDS, Schedule
+from semidense.stages.stage import Output, Params, Stage
+
+WINDOWS = (25, 9)
+"""Sides of the windows in which neighbours are counted, px."""
+
+
+class EvidenceNetParams(Schedule):
+    """How the net that weighs the evidence learns."""
+
+    steps: int = Field(4000, ge=1, description="optimiser steps")
+    optimiser: Literal["muon", "adam"] = Field("adam", description="what makes a step of a large kernel's gradient")
+    peak_rate: float = Field(0.01, gt=0, description="highest learning rate")
+    checkpoint_steps: int = Field(500, ge=1, description="steps between two checkpoints", exclude=True)
+    batch: int = Field(4096, ge=SHARDS, multiple_of=SHARDS, description="pixels a step; a multiple of the shards")
+    pixels: int = Field(20000, ge=1, description="pixels of each training scene, drawn at random")
+    tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
+    precision: Precision = Field("auto", description="arithmetic of the evaluation-Net: float32 or bfloat16")
+    seed: int = Field(0, ge=0, description="seed of the weights and of the draw")
+
+
+class EvidenceConfidenceParams(Params):
+    """How the confidence is computed from the evidence, and what vetoes it."""
+
+    precision: Precision = Field("auto", description="arithmetic of the evaluation-Net: float32 or bfloat16")
+    veto: bool = Field(
+        True,
+        description="confidence 0 where the costs have no clear winner, or a view is blank or repeats itself along "
+        "its rows",
+    )
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The products that these settings need."""
+        vetoing = ("distinctiveness", "cost_margin") if self.veto else ()
+        return ("images", "disparity", "evaluation_net", "evidence_net", *vetoing)
+
+
+EVIDENCE_NET = Stage(
+    product="evidence_net",
+    inputs=("images", "disparity", "truth", "evaluation_net"),
+    outputs=(
+        Output("parameters", ("parameter",), "float32", "1", "weights of the net, and the scale of its inputs"),
+        Output("loss", ("step",), "float32", "1", "cross-entropy of each training step"),
+    ),
+    compute="semidense.stages.evaluation.evidence.train:train_evidence_net",
+    params=EvidenceNetParams,
+    scope="split",
+    monitored=True,
+    learnt=True,
+)
+"""``disparity`` brings the array ``evidence`` (feature, y, x): ``use.disparity=aggregated``."""
+
+EVIDENCE_CONFIDENCE = Stage(
+    product="evidence_confidence",
+    inputs=("images", "disparity", "evaluation_net", "evidence_net", "distinctiveness", "cost_margin"),
+    outputs=(
+        Output(
+            "confidence", ("y", "x"), "float32", "1", "how sure it is that the disparity is right, in [0, 1]; 0: veto"
+        ),
+        Output("network", ("y", "x"), "float32", "1", "probability by the evaluation-Net alone, in [0, 1]"),
+        Output("agreement", ("y", "x"), "float32", "1", "share of the window with the same disparity, in (0, 1]"),
+    ),
+    compute="semidense.stages.evaluation.evidence.confidence:compute_evidence_confidence",
+    params=EvidenceConfidenceParams,
+    tile_rows=256,
+    halo=lambda _: RADIUS,
+    border="edge",
+)
+"""``use.confidence=evidence_confidence`` puts it in the place of ``confidence``."""

@@ -1,0 +1,33 @@
+"""The net that weighs the evidence of one pixel."""
+
+import torch
+from torch import Tensor, nn
+
+from semidense.stages.disparity.evidence import FEATURES
+from semidense.stages.evaluation.evidence.declaration import WINDOWS
+
+INPUTS = len(FEATURES) + 1 + 2 * len(WINDOWS)
+"""What the costs say, the evaluation-Net's log-odds, and two counts of neighbours a window."""
+HIDDEN = 32
+
+
+class EvidenceNet(nn.Module):
+    """From what is known of a pixel to the log-odds that its disparity is right: two hidden layers of 32 units."""
+
+    centre: Tensor
+    scale: Tensor
+
+    def __init__(self) -> None:
+        super().__init__()
+        # The inputs' mean and deviation in training, kept with the weights.
+        self.register_buffer("centre", torch.zeros(INPUTS))
+        self.register_buffer("scale", torch.ones(INPUTS))
+        self.first = nn.Linear(INPUTS, HIDDEN)
+        self.second = nn.Linear(HIDDEN, HIDDEN)
+        self.out = nn.Linear(HIDDEN, 1)
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Return log-odds (pixel,) of features (pixel, feature)."""
+        hidden = torch.relu(self.first((features - self.centre) / self.scale))
+        odds: Tensor = self.out(torch.relu(self.second(hidden))).squeeze(1)
+        return odds

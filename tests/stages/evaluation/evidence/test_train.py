@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+
+from semidense.stages.disparity.evidence import FEATURES
+from semidense.stages.evaluation.evidence.confidence import weigh
+from semidense.stages.evaluation.evidence.declaration import EVIDENCE_NET, EvidenceNetParams
+from semidense.stages.evaluation.evidence.features import of_whole_map
+from semidense.stages.evaluation.evidence.train import train_evidence_net
+from tests.stages.evaluation.evidence.test_confidence import products
+from tests.stages.monitors import InterruptedTrainingError, Memory
+
+PARAMS = EvidenceNetParams(steps=60, batch=64, pixels=200, precision="float32", checkpoint_steps=20)
+
+
+def training(count: int = 2) -> dict[str, object]:
+    """Scenes of which a disparity is right where the aggregated margin is large, and only there."""
+    scenes = [products(height=20, width=24) for _ in range(count)]
+    for number, given in enumerate(scenes):
+        margin = np.random.default_rng(number).uniform(0, 30, (20, 24)).astype(np.float16)
+        given["disparity"]["evidence"][FEATURES.index("aggregated_margin")] = margin
+        given["truth"] = {"disparity": given["disparity"]["disparity"] + np.where(margin > 8, 0, 5).astype(np.float32)}
+        given["truth"]["disparity"][:3] = np.nan
+    lists = {name: [given[name] for given in scenes] for name in ("images", "disparity", "truth")}
+    return {**lists, "evaluation_net": scenes[0]["evaluation_net"]}
+
+
+def test_makes_what_it_declares_and_one_seed_makes_it_again() -> None:
+    one, other = (train_evidence_net(PARAMS, training()) for _ in range(2))
+    assert list(one) == [output.name for output in EVIDENCE_NET.outputs]
+    assert all(np.array_equal(one[name], other[name]) and one[name].dtype == np.float32 for name in one)
+    assert not np.array_equal(
+        one["loss"], train_evidence_net(PARAMS.model_copy(update={"seed": 1}), training())["loss"]
+    )
+
+
+def test_it_learns_which_evidence_tells_right_from_wrong() -> None:
+    given = training()
+    made = train_evidence_net(PARAMS.model_copy(update={"steps": 300}), given)
+    scene = {name: given[name][0] for name in ("images", "disparity", "truth")}
+    known = of_whole_map(scene["images"], scene["disparity"], given["evaluation_net"], "float32")
+    right = scene["disparity"]["evidence"][FEATURES.index("aggregated_margin")] > 8
+    odds = weigh(made["parameters"], known.stacked)
+    assert np.mean((odds > 0) == right) > 0.95
+
+
+def test_a_training_that_was_killed_ends_as_an_undisturbed_one() -> None:
+    memory = Memory(stop_after=50)
+    with pytest.raises(InterruptedTrainingError):
+        train_evidence_net(PARAMS, training(), memory)
+    resumed = Memory(states=memory.states)
+    again = train_evidence_net(PARAMS, training(), resumed)
+    assert resumed.steps[0] == 41
+    assert all(np.array_equal(again[name], array) for name, array in train_evidence_net(PARAMS, training()).items())
