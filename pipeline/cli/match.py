@@ -124,12 +124,15 @@ def _plan(task: "Task", wishes: "Wishes", as_json: bool) -> None:
 def _carry_out(
     task: "Task", wishes: "Wishes", output: Path, kinds: Sequence[str], how: dict[str, Any], as_json: bool
 ) -> None:
+    from dataclasses import replace
+
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
     from semidense.pipeline.pairs.match import match_all
     from semidense.pipeline.pairs.match_files import require_place, save_all
 
-    require_place(output)
+    task = replace(task, dataset=task.open())
+    require_place(task.open().scenes, output, kinds)
     with ProgressWatch() as watch:
         found = match_all(task, wishes, watch=watch, **how)
     summaries = save_all(found, output, kinds)

@@ -12,7 +12,8 @@ from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.figures import density_figure, dots_figure, sheets
 from semidense.pipeline.comparison.rows import Row
 from semidense.pipeline.comparison.tables import THRESHOLD, TITLES, at, of, quoted
-from semidense.pipeline.files.writing import explaining, save_png, writable_folder
+from semidense.pipeline.files.publishing import publishing
+from semidense.pipeline.files.writing import explaining, save_png
 from semidense.pipeline.results.metric_rows import FIGURES
 
 COLUMNS = ("experiment", "scene", "method", "mask", "threshold_px", "R", *FIGURES, "quoted", "data")
@@ -45,16 +46,17 @@ def write_comparison(found: Comparison, folder: Path, threshold: float = THRESHO
         threshold: of the figures, one of ``THRESHOLDS``, px; the other files have all.
 
     Raises:
-        UsageError: if the folder cannot be written.
+        UsageError: if the folder cannot be written, or holds a file of these names that no earlier comparison wrote.
     """
-    writable_folder(folder)
-    written = [folder / "comparison.csv", folder / "comparison.json"]
-    for name, drawn in _figures(found, threshold).items():
-        save_png(drawn, folder / name)
-        written.append(folder / name)
-    _write(written[0], _csv([*found.rows, *found.means, *quoted(found)]))
-    _write(written[1], json.dumps(as_json(found, written), allow_nan=False, indent=1))
-    return written
+    figures = _figures(found, threshold)
+    names = ["comparison.csv", "comparison.json", *figures]
+    with publishing(folder, "comparison.json") as draft:
+        for name, drawn in figures.items():
+            save_png(drawn, draft / name)
+        _write(draft / "comparison.csv", _csv([*found.rows, *found.means, *quoted(found)]))
+        document = as_json(found) | {"files": names}
+        _write(draft / "comparison.json", json.dumps(document, allow_nan=False, indent=1))
+    return [folder / name for name in names]
 
 
 def _write(path: Path, text: str) -> None:
