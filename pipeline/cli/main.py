@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from semidense.pipeline.cli import compare, match, rectify, run, show
+from semidense.pipeline.cli import compare, match, run, show
 from semidense.pipeline.cli.cache.commands import cache_app
 
 app = typer.Typer(
@@ -36,7 +36,7 @@ def _options(
     """Take the options that stand before a command."""
 
 
-for commands in (run, match, rectify, compare, show):
+for commands in (run, match, compare, show):
     commands.register(app)
 app.add_typer(cache_app, name="cache")
 

@@ -1,4 +1,4 @@
-"""The command ``match``: a user's own pair, or many of them. Nothing heavy is imported before it runs."""
+"""The commands ``match`` and ``rectify``, for a user's own pairs. Nothing heavy is imported before one runs."""
 
 import sys
 from collections.abc import Sequence
@@ -12,10 +12,13 @@ from semidense.pipeline.cli.options import (
     ConfigOption,
     DryRunOption,
     JsonOption,
+    ModeOption,
     PresetOption,
     SchedulerOption,
     SetOption,
     WorkersOption,
+    chosen,
+    config_file,
 )
 from semidense.pipeline.plan.presets import DEFAULT
 
@@ -27,8 +30,9 @@ _EXAMPLES = {"density": "80% or 0.8", "max-error": "2% or 0.02"}
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
+    """Add the commands to the command line."""
     app.command()(match)
+    app.command()(rectify)
 
 
 def match(
@@ -73,6 +77,7 @@ def match(
     ] = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     dry_run: DryRunOption = False,
     scheduler: SchedulerOption = None,
@@ -90,7 +95,9 @@ def match(
 
     options = PairOptions(tuple(calib or ()), unit, min_disp, max_disp, split)
     sides = [left] if right is None else [left, right]
-    task = Task(pair_spec(sides, options), tuple(scene or ()), tuple(settings or ()), config, False, cache, preset)
+    task = Task(
+        pair_spec(sides, options), tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, preset
+    )
     wishes = Wishes(
         R=threshold,
         density=_share("density", density),
@@ -217,3 +224,41 @@ def _formats(text: str) -> list[str]:
         if kind not in FORMATS:
             raise UsageError(f"no format {kind!r}; {nearest(kind, FORMATS)}")
     return chosen
+
+
+def rectify(
+    left: Annotated[Path, typer.Argument(help="The left view, as the camera took it.")],
+    right: Annotated[Path, typer.Argument(help="The right view.")],
+    calib: Annotated[
+        list[Path],
+        typer.Option(
+            help="OpenCV's stereo calibration with M1 D1 M2 D2 and R T, or R1 R2 P1 P2; repeat the option if it is in "
+            "two files."
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Write both views and their calibration to this folder.")
+    ] = Path("rectified"),
+    unit: Annotated[
+        str | None, typer.Option(help="Unit of the calibration's lengths: mm, cm or m; match needs it for depth.")
+    ] = None,
+    alpha: Annotated[
+        float,
+        typer.Option(min=0, max=1, help="0: crop to what both lenses saw; 1: keep every pixel, with black edges."),
+    ] = 0.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Rectify a pair, so that match can take it.
+
+    Needs OpenCV and a stereo calibration that was made with OpenCV.
+    """
+    from semidense.pipeline.cli.console import print_json
+    from semidense.pipeline.pairs.rectification import rectify_files
+
+    files = rectify_files(left, right, calib, output, unit, alpha)
+    if as_json:
+        print_json({"files": [str(file) for file in files]})
+        return
+    for file in files:
+        typer.echo(f"wrote {file}")
+    typer.echo(f"next: pipeline match {files[0]} {files[1]} --calib {files[2]} -o DIR")

@@ -1,5 +1,6 @@
 """The arguments and options that several commands take, each said once."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +16,22 @@ PresetOption = Annotated[
         help="Settings to start from: paper, or robust: fewer wrong pixels where texture is thin.",
     ),
 ]
-ConfigOption = Annotated[Path | None, typer.Option("--config", help="A TOML file with the same sections.")]
+ModeOption = Annotated[
+    str | None,
+    typer.Option(
+        "--mode",
+        help="How costs are computed: exact, guided (fewer disparities, same networks) or fast (a smaller network); "
+        "the same as --set costvolume.mode=...",
+    ),
+]
+ConfigOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        help="Settings from a TOML file, or from a config.json that --output wrote [default: $PIPELINE_CONFIG, else "
+        "./pipeline.toml if there is one].",
+    ),
+]
 CacheOption = Annotated[
     Path | None, typer.Option("--cache", help="The cache's folder [default: $PIPELINE_CACHE, else the user's].")
 ]
@@ -34,3 +50,15 @@ ForceOption = Annotated[
 ]
 DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Only say what would be reused and made.")]
 ProductArgument = Annotated[str, typer.Argument(help="Such as costvolume, disparity or confidence.")]
+
+
+def chosen(settings: list[str] | None, mode: str | None) -> tuple[str, ...]:
+    """Return the settings that ``--set`` and ``--mode`` give; ``--mode`` wins."""
+    return (*(settings or ()), *([f"costvolume.mode={mode}"] if mode else []))
+
+
+def config_file(config: Path | None) -> Path | None:
+    """Return the file of settings: ``--config``, else ``$PIPELINE_CONFIG``, else ``./pipeline.toml`` if it is there."""
+    named = os.environ.get("PIPELINE_CONFIG")
+    beside = Path("pipeline.toml")
+    return config or (Path(named).expanduser() if named else beside if beside.is_file() else None)

@@ -12,6 +12,7 @@ from semidense.pipeline.cli.options import (
     DryRunOption,
     ForceOption,
     JsonOption,
+    ModeOption,
     OutputOption,
     PresetOption,
     ProductArgument,
@@ -21,6 +22,8 @@ from semidense.pipeline.cli.options import (
     TrainOption,
     UptoOption,
     WorkersOption,
+    chosen,
+    config_file,
 )
 from semidense.pipeline.plan.presets import DEFAULT
 
@@ -42,6 +45,7 @@ def run(
     scene: SceneOption = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
     dry_run: DryRunOption = False,
@@ -57,7 +61,7 @@ def run(
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
 
-    task = _task(dataset, scene, settings, config, train, cache, preset)
+    task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     if dry_run:
         return _print_plan(api.status(task, upto, forced=force or ()), as_json)
     with ProgressWatch() as watch:
@@ -79,6 +83,7 @@ def sweep(
         list[str] | None, typer.Option("--set", help="section.field=value1,value2; all combinations are made.")
     ] = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
     output: Annotated[Path, typer.Option("--output", "-o", help="Where sweep.csv and sweep.png go.")] = Path("sweep"),
@@ -96,7 +101,7 @@ def sweep(
     from semidense.pipeline.execution.progress import ProgressWatch
     from semidense.pipeline.files.run_files import write_sweep
 
-    task = _task(dataset, scene, None, config, train, cache, preset)
+    task = _task(dataset, scene, chosen(None, mode), config, train, cache, preset)
     with ProgressWatch() as watch:
         result = api.sweep(task, thresholds, settings or (), watch=watch, scheduler=scheduler, workers=workers)
     files = write_sweep(result.metrics, output)
@@ -115,6 +120,7 @@ def status(
     scene: SceneOption = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
     cache: CacheOption = None,
@@ -123,7 +129,7 @@ def status(
     """Say what is cached, and what changed if it is not."""
     from semidense.pipeline import api
 
-    _print_plan(api.status(_task(dataset, scene, settings, config, train, cache, preset), upto), as_json)
+    _print_plan(api.status(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), upto), as_json)
 
 
 def explain(
@@ -132,6 +138,7 @@ def explain(
     scene: SceneOption = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
     graph: Annotated[Path | None, typer.Option("--graph", help="Draw what it was made from (SVG, PNG, PDF).")] = None,
@@ -146,7 +153,7 @@ def explain(
     from semidense.pipeline.cli.explain import draw_provenance, explanation, print_explanation
     from semidense.pipeline.plan.config import preset_settings
 
-    planned = api.explain(_task(dataset, scene, settings, config, train, cache, preset), product)
+    planned = api.explain(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), product)
     found = explanation(planned, api.open_store(cache))
     found |= {"preset": {"name": preset, "settings": list(preset_settings(preset))}}
     if graph:
@@ -168,6 +175,7 @@ def inspect(
     disparity: Annotated[int | None, typer.Option("--disparity", help="Which cost slice to draw, px.")] = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
     cache: CacheOption = None,
@@ -180,7 +188,7 @@ def inspect(
     from semidense.pipeline import api
     from semidense.pipeline.cli.inspect import draw, inspection, print_inspection
 
-    planned = api.explain(_task(dataset, scene, settings, config, train, cache, preset), product)
+    planned = api.explain(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), product)
     found = inspection(planned, api.open_store(cache))
     if png:
         draw(found, png, pixel, disparity)
@@ -190,7 +198,7 @@ def inspect(
 def _task(
     dataset: str,
     scenes: list[str] | None,
-    settings: list[str] | None,
+    settings: tuple[str, ...],
     config: Path | None,
     train: bool,
     cache: Path | None,
@@ -198,7 +206,7 @@ def _task(
 ) -> "Task":
     from semidense.pipeline.api import Task
 
-    return Task(dataset, tuple(scenes or ()), tuple(settings or ()), config, train, cache, preset)
+    return Task(dataset, tuple(scenes or ()), settings, config_file(config), train, cache, preset)
 
 
 def _print_plan(plan: "Plan", as_json: bool) -> None:

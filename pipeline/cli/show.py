@@ -13,9 +13,12 @@ from semidense.pipeline.cli.options import (
     ConfigOption,
     DatasetArgument,
     JsonOption,
+    ModeOption,
     PresetOption,
     SceneOption,
     SetOption,
+    chosen,
+    config_file,
 )
 from semidense.pipeline.plan.presets import DEFAULT
 
@@ -35,6 +38,7 @@ def report(
     scene: SceneOption = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     train: Annotated[bool, typer.Option("--train", help="Of a run that trained the networks.")] = False,
     cache: CacheOption = None,
@@ -46,7 +50,9 @@ def report(
     from semidense.pipeline.api import Task
     from semidense.pipeline.pages.report import report as write
 
-    path = write(Task(dataset, tuple(scene or ()), tuple(settings or ()), config, train, cache, preset), output)
+    path = write(
+        Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), train, cache, preset), output
+    )
     typer.echo(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
 
 
