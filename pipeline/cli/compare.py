@@ -62,14 +62,15 @@ def compare(
     mode: ModeOption = None,
     config: ConfigOption = None,
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="Where comparison.csv, comparison.json and the figures go.")
+        Path,
+        typer.Option("--output", "-o", help="Write comparison.csv, comparison.json and the figures to this folder."),
     ] = Path("comparison"),
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Set other matchers beside the two networks.
+    """Compare other matchers with the two networks.
 
     The paper's experiments: raw maps, error at equal density, confidence measures.
     """

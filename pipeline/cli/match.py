@@ -36,44 +36,69 @@ def register(app: typer.Typer) -> None:
 
 
 def match(
-    left: Annotated[str, typer.Argument(help="The left view; or a folder, a pattern with one *, or a list (.csv).")],
-    right: Annotated[str | None, typer.Argument(help="The right view, as LEFT; nothing for a list.")] = None,
+    left: Annotated[
+        str,
+        typer.Argument(
+            help="The left view: an image; for many pairs a folder, a pattern with one *, or a list (.csv)."
+        ),
+    ],
+    right: Annotated[
+        str | None, typer.Argument(help="The right view, given like LEFT; leave it out after a list.")
+    ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Write everything to this folder.")] = Path("matched"),
     min_disp: Annotated[
-        int | None, typer.Option(help="Smallest disparity, px [default: the calibration's, else estimated].")
+        int | None,
+        typer.Option(help="Smallest disparity to search, px [default: from the calibration, else estimated]."),
     ] = None,
-    max_disp: Annotated[int | None, typer.Option(help="Largest disparity, px.")] = None,
+    max_disp: Annotated[
+        int | None, typer.Option(help="Largest disparity to search, px [default: as for --min-disp].")
+    ] = None,
     calib: Annotated[
         list[str] | None,
-        typer.Option(help="Calibration: Middlebury's, OpenCV's, KITTI's, JSON, ...; ROS's left and right file by two."),
+        typer.Option(
+            help="Calibration file (Middlebury, OpenCV, KITTI, JSON, ...), for depth; of ROS both files, left first."
+        ),
     ] = None,
     split: Annotated[
-        str | None, typer.Option(help="LEFT holds both views: side-by-side, or over-under (upper: left view).")
+        str | None,
+        typer.Option(help="LEFT is one image of both views: side-by-side, or over-under (the left view above)."),
     ] = None,
     unit: Annotated[
-        str | None, typer.Option(help="Unit of length of a calibration that does not tell it: mm, cm or m.")
+        str | None, typer.Option(help="Unit of length in the calibration, if the file does not say: mm, cm or m.")
     ] = None,
     threshold: Annotated[
-        float | None, typer.Option("--R", help="Least confidence that is kept [default: 0.9].")
+        float | None, typer.Option("--R", help="Keep disparities of at least this confidence, 0 to 1 [default: 0.9].")
     ] = None,
     density: Annotated[
-        str | None, typer.Option(help="Keep this share of the image instead, the most confident; such as 80%.")
+        str | None,
+        typer.Option(help="Instead of --R: keep the most confident pixels, this share of the image, such as 80%."),
     ] = None,
     max_error: Annotated[
-        str | None, typer.Option("--max-error", help="Keep what is wrong no more often than this; such as 2%.")
+        str | None,
+        typer.Option(
+            "--max-error", help="Instead of --R: keep as many pixels as this share of errors allows, such as 2%."
+        ),
     ] = None,
     calibrated: Annotated[
-        bool, typer.Option("--calibrated", help="Give the confidence, and take --R, as a measured probability.")
+        bool,
+        typer.Option(
+            "--calibrated", help="Turn the confidence into a measured probability of being right; --R then means it."
+        ),
     ] = False,
-    left_right: Annotated[bool, typer.Option("--left-right", help="Drop what the right view contradicts.")] = False,
-    subpixel: Annotated[bool, typer.Option("--subpixel", help="Refine disparities below a pixel.")] = False,
+    left_right: Annotated[
+        bool, typer.Option("--left-right", help="Drop disparities that the right view's map contradicts.")
+    ] = False,
+    subpixel: Annotated[bool, typer.Option("--subpixel", help="Refine disparities to fractions of a pixel.")] = False,
     fill: Annotated[
-        bool, typer.Option("--fill", help="Fill holes with the background: dense, partly guessed.")
+        bool,
+        typer.Option(
+            "--fill", help="Fill holes with the background beside them: the map has no holes, but is partly guessed."
+        ),
     ] = False,
-    right_view: Annotated[bool, typer.Option("--right-view", help="Write the right view's raw map too.")] = False,
-    formats: Annotated[str, typer.Option("--format", help="Formats of the maps.")] = "pfm,png,tiff,npy",
+    right_view: Annotated[bool, typer.Option("--right-view", help="Also write the right view's raw map.")] = False,
+    formats: Annotated[str, typer.Option("--format", help="Formats of the maps, with commas.")] = "pfm,png,tiff,npy",
     scene: Annotated[
-        list[str] | None, typer.Option("--scene", help="Only this pair of several; may be repeated.")
+        list[str] | None, typer.Option("--scene", help="Match this pair only; repeat the option for several.")
     ] = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,

@@ -56,7 +56,7 @@ def run(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a dataset's products, reusing all that is cached."""
+    """Make the products of a dataset; what is cached is reused."""
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
@@ -77,24 +77,31 @@ def run(
 
 def sweep(
     dataset: DatasetArgument = "motorcycle",
-    thresholds: Annotated[str, typer.Option("--R", help="first:last:step, or numbers with commas.")] = "0.05:0.95:0.05",
+    thresholds: Annotated[
+        str, typer.Option("--R", help="Confidence thresholds: first:last:step, or numbers with commas.")
+    ] = "0.05:0.95:0.05",
     scene: SceneOption = None,
     settings: Annotated[
-        list[str] | None, typer.Option("--set", help="section.field=value1,value2; all combinations are made.")
+        list[str] | None,
+        typer.Option(
+            "--set", help="Try several values of a setting: section.field=value1,value2; all combinations are made."
+        ),
     ] = None,
     preset: PresetOption = DEFAULT,
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Where sweep.csv and sweep.png go.")] = Path("sweep"),
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Write sweep.csv, sweep.png and sweep.json to this folder.")
+    ] = Path("sweep"),
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Filter at many thresholds R, and over other settings.
+    """Compare error and density at many thresholds R, and over other settings.
 
-    Says what was reused; --set section.field=value1,value2 tries several values of any setting.
+    --set section.field=value1,value2 tries several values of any setting.
     """
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
@@ -126,7 +133,7 @@ def status(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Say what is cached, and what changed if it is not."""
+    """Print which products are cached, and why the others must be made."""
     from semidense.pipeline import api
 
     _print_plan(api.status(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), upto), as_json)
@@ -141,13 +148,16 @@ def explain(
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
-    graph: Annotated[Path | None, typer.Option("--graph", help="Draw what it was made from (SVG, PNG, PDF).")] = None,
+    graph: Annotated[
+        Path | None,
+        typer.Option("--graph", help="Draw what the product was made from into this file (SVG, PNG or PDF)."),
+    ] = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what a product's key is made of.
+    """Show what a product's cache key is made of.
 
-    Also why it would be made again, and what it was made from.
+    Also shows why the product would be made again, and from what it was made.
     """
     from semidense.pipeline import api
     from semidense.pipeline.cli.explain import draw_provenance, explanation, print_explanation
@@ -171,8 +181,10 @@ def inspect(
     dataset: DatasetArgument = "motorcycle",
     scene: SceneOption = None,
     png: Annotated[Path | None, typer.Option("--png", help="Draw the product into this file.")] = None,
-    pixel: Annotated[str | None, typer.Option("--pixel", help="Y,X: whose cost curve to draw.")] = None,
-    disparity: Annotated[int | None, typer.Option("--disparity", help="Which cost slice to draw, px.")] = None,
+    pixel: Annotated[str | None, typer.Option("--pixel", help="Draw the cost curve of this pixel: Y,X.")] = None,
+    disparity: Annotated[
+        int | None, typer.Option("--disparity", help="Draw the slice of costs at this disparity, px.")
+    ] = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
     mode: ModeOption = None,
@@ -181,9 +193,9 @@ def inspect(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show a cached product: its xarray, figures and picture.
+    """Show a cached product: its arrays, statistics and picture.
 
-    Also how to open it in Python. A map is drawn in terminals that can show it.
+    Also shows how to open it in Python. Terminals with colours show a map at once.
     """
     from semidense.pipeline import api
     from semidense.pipeline.cli.inspect import draw, inspection, print_inspection

@@ -137,7 +137,7 @@ def rectify_files(
             write_rgb(view, draft / name)
         (draft / "calibration.json").write_text(json.dumps(_described(rig, size, unit), indent=1) + "\n")
         names = ["left.png", "right.png", "calibration.json", RECORD]
-        (draft / RECORD).write_text(json.dumps(provenance(sys.argv, {}) | {"files": names}, indent=2) + "\n")
+        (draft / RECORD).write_text(json.dumps(provenance(sys.argv) | {"files": names}, indent=2) + "\n")
     return [folder / name for name in names]
 
 
