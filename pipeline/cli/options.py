@@ -27,7 +27,7 @@ ModeOption = Annotated[
     str | None,
     typer.Option(
         "--mode",
-        help="How costs are computed: exact, guided (fewer disparities, same networks) or fast (a smaller network); "
+        help="How costs are computed: exact, guided (only proposed disparities) or fast (products of descriptors); "
         "the same as --set costvolume.mode=...",
     ),
 ]

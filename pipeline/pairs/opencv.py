@@ -12,6 +12,7 @@ from semidense.pipeline.api import Task
 from semidense.pipeline.pairs.match import Wishes, match
 from semidense.pipeline.plan.config import Settings, nearest, setting_texts
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.presets import DEFAULT
 
 _WISHES = tuple(field.name for field in fields(Wishes))
 _WITHOUT_COUNTERPART = (
@@ -41,6 +42,7 @@ class StereoMatcher:
         *,
         disp12MaxDiff: float = -1,
         settings: Settings = (),
+        preset: str = DEFAULT,
         cache: Path | str | None = None,
         **wishes: Any,  # noqa: ANN401 - those of Wishes
     ) -> None:
@@ -50,7 +52,8 @@ class StereoMatcher:
             minDisparity: px, a whole number.
             numDisparities: how many, from 1; no multiple of 16 is needed.
             disp12MaxDiff: drop disparities that the right view's map contradicts by more than this, px; below 0: none.
-            settings: ``section.field=value`` of the configuration.
+            settings: ``section.field=value`` of the configuration, over those of the preset.
+            preset: named settings to start from.
             cache: the cache's folder.
             **wishes: attributes of ``semidense.pipeline.pairs.match.Wishes``, such as ``R=0.8``, ``density=0.5`` or
                 ``subpixel=True``.
@@ -64,9 +67,14 @@ class StereoMatcher:
         _refuse_unknown(wishes)
         if disp12MaxDiff >= 0:
             wishes |= {"left_right": True, "tolerance": float(disp12MaxDiff)}
-        Task(settings=settings).and_settings(Wishes(**wishes).settings).configuration()
+        Task(settings=settings, preset=preset).and_settings(Wishes(**wishes).settings).configuration()
         self._range = range(low, low + count)
-        self._how: dict[str, Any] = {"settings": setting_texts(settings), "cache": cache, **wishes}
+        self._how: dict[str, Any] = {
+            "settings": setting_texts(settings),
+            "preset": preset,
+            "cache": cache,
+            **wishes,
+        }
         self._confidence: NDArray[np.float32] | None = None
 
     @classmethod
@@ -128,7 +136,7 @@ def _refuse_unknown(wishes: Mapping[str, object]) -> None:
                 f"{name} of OpenCV has no counterpart here: the networks decide what matches; leave it out"
             )
         if name not in _WISHES:
-            known = ("minDisparity", "numDisparities", "disp12MaxDiff", "settings", "cache", *_WISHES)
+            known = ("minDisparity", "numDisparities", "disp12MaxDiff", "settings", "preset", "cache", *_WISHES)
             raise UsageError(f"StereoMatcher has no parameter {name!r}; {nearest(name, known)}")
 
 

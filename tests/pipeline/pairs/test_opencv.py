@@ -66,6 +66,7 @@ def test_whole_numbers_of_every_kind_are_taken(number: int) -> None:
         pytest.param({"minDisparity": "0"}, "whole number", id="a text"),
         pytest.param({"numDisparties": 64}, "did you mean numDisparities", id="a typing mistake"),
         pytest.param({"blockSize": 5}, "no counterpart", id="of another matcher"),
+        pytest.param({"preset": "papr"}, "no preset", id="an unknown preset"),
         pytest.param({"R": 2}, "semidense.R = 2", id="R above 1"),
         pytest.param({"R": 0.5, "density": 0.5}, "give one of them", id="two wishes"),
         pytest.param({"settings": ["costvolume.mod=fast"]}, "did you mean", id="an unknown setting"),
