@@ -9,11 +9,14 @@ from semidense.pipeline.cli.options import (
     CacheOption,
     ConfigOption,
     JsonOption,
+    ModeOption,
     PresetOption,
     SceneOption,
     SchedulerOption,
     SetOption,
     WorkersOption,
+    chosen,
+    config_file,
 )
 from semidense.pipeline.plan.presets import DEFAULT
 
@@ -56,16 +59,18 @@ def compare(
     ] = 1.0,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="Where comparison.csv, comparison.json and the figures go.")
+        Path,
+        typer.Option("--output", "-o", help="Write comparison.csv, comparison.json and the figures to this folder."),
     ] = Path("comparison"),
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Set other matchers beside the two networks.
+    """Compare other matchers with the two networks.
 
     The paper's experiments: raw maps, error at equal density, confidence measures.
     """
@@ -81,7 +86,7 @@ def compare(
     if threshold not in THRESHOLDS:
         offered = ", ".join(f"{each:g}" for each in THRESHOLDS)
         raise UsageError(f"--threshold {threshold:g}: figures are worked out for {offered} px")
-    task = api.Task(dataset, tuple(scene or ()), tuple(settings or ()), config, False, cache, preset)
+    task = api.Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, preset)
     experiments = experiment or comparison.EXPERIMENTS
     with ProgressWatch() as watch:
         found = comparison.compare(

@@ -53,9 +53,10 @@ def _change_row(change: Change) -> dict[str, Any]:
 def print_plan(plan: Plan) -> None:
     """Print a line a product and scene: its state, its key, and why it is not a hit."""
     table = Table("product", "scene", "state", "key", "why", box=None, pad_edge=False)
+    tellers: dict[str, str] = {}
     for planned in plan.steps:
         state = f"[{STYLES[planned.state]}]{planned.state}[/]"
-        scene, reason = escape(planned.step.scene), escape(why(planned))
+        scene, reason = escape(planned.step.scene), escape(why(planned, tellers))
         table.add_row(planned.step.product, scene, state, short(planned.key or ""), reason)
     console = results()
     console.print(table)
@@ -68,14 +69,24 @@ def print_plan(plan: Plan) -> None:
     console.print(f"reuses {hits} products, makes {making}", highlight=False)
 
 
-def why(planned: Planned) -> str:
-    """Return why a step is not a hit, in one line; nothing for a hit."""
+def why(planned: Planned, tellers: dict[str, str] | None = None) -> str:
+    """Return why a step is not a hit, in one line; nothing for a hit.
+
+    Args:
+        planned: the step.
+        tellers: the product that told each cause first, which this call adds to: a product below it names only that
+            product, so that a cause is told once.
+    """
     if planned.damage:
         return f"damaged: {planned.damage}"
     if planned.state == "missing":
         return "never made" if planned.key else "never made; its inputs are not there yet"
     if planned.causes:
-        return "; ".join(_telling(planned.causes))
+        product, tellers = planned.step.product, {} if tellers is None else tellers
+        told = dict.fromkeys(tellers.setdefault(cause, product) for cause in planned.causes)
+        fresh = [cause for cause in planned.causes if tellers[cause] == product]
+        above = [each for each in told if each != product]
+        return "; ".join([*_telling(fresh), *([f"because of {', '.join(above)}"] if above else [])])
     above = [change.field.removeprefix("inputs.") for change in planned.changed if change.new == PENDING]
     own = [str(change) for change in planned.changed if change.new != PENDING]
     return "; ".join([*_telling(own), *([f"made after {', '.join(above)}"] if above else [])])

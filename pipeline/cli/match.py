@@ -1,4 +1,4 @@
-"""The command ``match``: a user's own pair, or many of them. Nothing heavy is imported before it runs."""
+"""The commands ``match`` and ``rectify``, for a user's own pairs. Nothing heavy is imported before one runs."""
 
 import sys
 from collections.abc import Sequence
@@ -12,10 +12,13 @@ from semidense.pipeline.cli.options import (
     ConfigOption,
     DryRunOption,
     JsonOption,
+    ModeOption,
     PresetOption,
     SchedulerOption,
     SetOption,
     WorkersOption,
+    chosen,
+    config_file,
 )
 from semidense.pipeline.plan.presets import DEFAULT
 
@@ -27,52 +30,79 @@ _EXAMPLES = {"density": "80% or 0.8", "max-error": "2% or 0.02"}
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
+    """Add the commands to the command line."""
     app.command()(match)
+    app.command()(rectify)
 
 
 def match(
-    left: Annotated[str, typer.Argument(help="The left view; or a folder, a pattern with one *, or a list (.csv).")],
-    right: Annotated[str | None, typer.Argument(help="The right view, as LEFT; nothing for a list.")] = None,
+    left: Annotated[
+        str,
+        typer.Argument(
+            help="The left view: an image; for many pairs a folder, a pattern with one *, or a list (.csv)."
+        ),
+    ],
+    right: Annotated[
+        str | None, typer.Argument(help="The right view, given like LEFT; leave it out after a list.")
+    ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Write everything to this folder.")] = Path("matched"),
     min_disp: Annotated[
-        int | None, typer.Option(help="Smallest disparity, px [default: the calibration's, else estimated].")
+        int | None,
+        typer.Option(help="Smallest disparity to search, px [default: from the calibration, else estimated]."),
     ] = None,
-    max_disp: Annotated[int | None, typer.Option(help="Largest disparity, px.")] = None,
+    max_disp: Annotated[
+        int | None, typer.Option(help="Largest disparity to search, px [default: as for --min-disp].")
+    ] = None,
     calib: Annotated[
         list[str] | None,
-        typer.Option(help="Calibration: Middlebury's, OpenCV's, KITTI's, JSON, ...; ROS's left and right file by two."),
+        typer.Option(
+            help="Calibration file (Middlebury, OpenCV, KITTI, JSON, ...), for depth; of ROS both files, left first."
+        ),
     ] = None,
     split: Annotated[
-        str | None, typer.Option(help="LEFT holds both views: side-by-side, or over-under (upper: left view).")
+        str | None,
+        typer.Option(help="LEFT is one image of both views: side-by-side, or over-under (the left view above)."),
     ] = None,
     unit: Annotated[
-        str | None, typer.Option(help="Unit of length of a calibration that does not tell it: mm, cm or m.")
+        str | None, typer.Option(help="Unit of length in the calibration, if the file does not say: mm, cm or m.")
     ] = None,
     threshold: Annotated[
-        float | None, typer.Option("--R", help="Least confidence that is kept [default: 0.9].")
+        float | None, typer.Option("--R", help="Keep disparities of at least this confidence, 0 to 1 [default: 0.9].")
     ] = None,
     density: Annotated[
-        str | None, typer.Option(help="Keep this share of the image instead, the most confident; such as 80%.")
+        str | None,
+        typer.Option(help="Instead of --R: keep the most confident pixels, this share of the image, such as 80%."),
     ] = None,
     max_error: Annotated[
-        str | None, typer.Option("--max-error", help="Keep what is wrong no more often than this; such as 2%.")
+        str | None,
+        typer.Option(
+            "--max-error", help="Instead of --R: keep as many pixels as this share of errors allows, such as 2%."
+        ),
     ] = None,
     calibrated: Annotated[
-        bool, typer.Option("--calibrated", help="Give the confidence, and take --R, as a measured probability.")
+        bool,
+        typer.Option(
+            "--calibrated", help="Turn the confidence into a measured probability of being right; --R then means it."
+        ),
     ] = False,
-    left_right: Annotated[bool, typer.Option("--left-right", help="Drop what the right view contradicts.")] = False,
-    subpixel: Annotated[bool, typer.Option("--subpixel", help="Refine disparities below a pixel.")] = False,
+    left_right: Annotated[
+        bool, typer.Option("--left-right", help="Drop disparities that the right view's map contradicts.")
+    ] = False,
+    subpixel: Annotated[bool, typer.Option("--subpixel", help="Refine disparities to fractions of a pixel.")] = False,
     fill: Annotated[
-        bool, typer.Option("--fill", help="Fill holes with the background: dense, partly guessed.")
+        bool,
+        typer.Option(
+            "--fill", help="Fill holes with the background beside them: the map has no holes, but is partly guessed."
+        ),
     ] = False,
-    right_view: Annotated[bool, typer.Option("--right-view", help="Write the right view's raw map too.")] = False,
-    formats: Annotated[str, typer.Option("--format", help="Formats of the maps.")] = "pfm,png,tiff,npy",
+    right_view: Annotated[bool, typer.Option("--right-view", help="Also write the right view's raw map.")] = False,
+    formats: Annotated[str, typer.Option("--format", help="Formats of the maps, with commas.")] = "pfm,png,tiff,npy",
     scene: Annotated[
-        list[str] | None, typer.Option("--scene", help="Only this pair of several; may be repeated.")
+        list[str] | None, typer.Option("--scene", help="Match this pair only; repeat the option for several.")
     ] = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     dry_run: DryRunOption = False,
     scheduler: SchedulerOption = None,
@@ -90,7 +120,9 @@ def match(
 
     options = PairOptions(tuple(calib or ()), unit, min_disp, max_disp, split)
     sides = [left] if right is None else [left, right]
-    task = Task(pair_spec(sides, options), tuple(scene or ()), tuple(settings or ()), config, False, cache, preset)
+    task = Task(
+        pair_spec(sides, options), tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, preset
+    )
     wishes = Wishes(
         R=threshold,
         density=_share("density", density),
@@ -124,12 +156,15 @@ def _plan(task: "Task", wishes: "Wishes", as_json: bool) -> None:
 def _carry_out(
     task: "Task", wishes: "Wishes", output: Path, kinds: Sequence[str], how: dict[str, Any], as_json: bool
 ) -> None:
+    from dataclasses import replace
+
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
     from semidense.pipeline.pairs.match import match_all
     from semidense.pipeline.pairs.match_files import require_place, save_all
 
-    require_place(output)
+    task = replace(task, dataset=task.open())
+    require_place(task.open().scenes, output, kinds)
     with ProgressWatch() as watch:
         found = match_all(task, wishes, watch=watch, **how)
     summaries = save_all(found, output, kinds)
@@ -215,3 +250,41 @@ def _formats(text: str) -> list[str]:
         if kind not in FORMATS:
             raise UsageError(f"no format {kind!r}; {nearest(kind, FORMATS)}")
     return chosen
+
+
+def rectify(
+    left: Annotated[Path, typer.Argument(help="The left view, as the camera took it.")],
+    right: Annotated[Path, typer.Argument(help="The right view.")],
+    calib: Annotated[
+        list[Path],
+        typer.Option(
+            help="OpenCV's stereo calibration with M1 D1 M2 D2 and R T, or R1 R2 P1 P2; repeat the option if it is in "
+            "two files."
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Write both views and their calibration to this folder.")
+    ] = Path("rectified"),
+    unit: Annotated[
+        str | None, typer.Option(help="Unit of the calibration's lengths: mm, cm or m; match needs it for depth.")
+    ] = None,
+    alpha: Annotated[
+        float,
+        typer.Option(min=0, max=1, help="0: crop to what both lenses saw; 1: keep every pixel, with black edges."),
+    ] = 0.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Rectify a pair, so that match can take it.
+
+    Needs OpenCV and a stereo calibration that was made with OpenCV.
+    """
+    from semidense.pipeline.cli.console import print_json
+    from semidense.pipeline.pairs.rectification import rectify_files
+
+    files = rectify_files(left, right, calib, output, unit, alpha)
+    if as_json:
+        print_json({"files": [str(file) for file in files]})
+        return
+    for file in files:
+        typer.echo(f"wrote {file}")
+    typer.echo(f"next: pipeline match {files[0]} {files[1]} --calib {files[2]} -o DIR")

@@ -1,13 +1,21 @@
 """The arguments and options that several commands take, each said once."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-DatasetArgument = Annotated[str, typer.Argument(help="Such as motorcycle or middlebury:DIR; see `pipeline data list`.")]
-SceneOption = Annotated[list[str] | None, typer.Option("--scene", help="Only this scene; may be repeated.")]
-SetOption = Annotated[list[str] | None, typer.Option("--set", help="section.field=value; may be repeated.")]
+DatasetArgument = Annotated[
+    str, typer.Argument(help="Scenes to work on, such as motorcycle or middlebury:DIR; `pipeline data list` names all.")
+]
+SceneOption = Annotated[
+    list[str] | None, typer.Option("--scene", help="Work on this scene only; repeat the option for several.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Change a setting: section.field=value; repeat the option for several."),
+]
 PresetOption = Annotated[
     str,
     typer.Option(
@@ -15,22 +23,62 @@ PresetOption = Annotated[
         help="Settings to start from: paper, or robust: fewer wrong pixels where texture is thin.",
     ),
 ]
-ConfigOption = Annotated[Path | None, typer.Option("--config", help="A TOML file with the same sections.")]
-CacheOption = Annotated[
-    Path | None, typer.Option("--cache", help="The cache's folder [default: $PIPELINE_CACHE, else the user's].")
+ModeOption = Annotated[
+    str | None,
+    typer.Option(
+        "--mode",
+        help="How costs are computed: exact, guided (only proposed disparities) or fast (products of descriptors); "
+        "the same as --set costvolume.mode=...",
+    ),
 ]
-TrainOption = Annotated[bool, typer.Option("--train", help="Train the networks; the shipped weights are not used.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else, on stdout.")]
+ConfigOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        help="Settings from a TOML file, or from a config.json that --output wrote [default: $PIPELINE_CONFIG, else "
+        "./pipeline.toml if there is one].",
+    ),
+]
+CacheOption = Annotated[
+    Path | None,
+    typer.Option("--cache", help="Folder of the cache [default: $PIPELINE_CACHE, else your user cache folder]."),
+]
+TrainOption = Annotated[
+    bool, typer.Option("--train", help="Train the networks instead of using the weights that come with the package.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object on stdout.")]
 OutputOption = Annotated[
     Path | None, typer.Option("--output", "-o", help="Write maps, metrics and configuration to this folder.")
 ]
 SchedulerOption = Annotated[
-    str | None, typer.Option("--scheduler", help="A Dask scheduler, tcp://HOST:PORT; the cache must be shared.")
+    str | None,
+    typer.Option(
+        "--scheduler", help="Compute on this Dask cluster, tcp://HOST:PORT; its workers must see the same cache folder."
+    ),
 ]
-WorkersOption = Annotated[int | None, typer.Option("--workers", min=1, help="Threads [default: one a core].")]
-UptoOption = Annotated[str, typer.Option("--upto", help="The product to stop at.")]
+WorkersOption = Annotated[
+    int | None, typer.Option("--workers", min=1, help="Number of threads [default: one for each core].")
+]
+UptoOption = Annotated[str, typer.Option("--upto", help="Make products up to this one.")]
 ForceOption = Annotated[
-    list[str] | None, typer.Option("--force", help="Make this product again, and compare; may be repeated.")
+    list[str] | None,
+    typer.Option(
+        "--force", help="Make this product again and check that it comes out the same; repeat the option for several."
+    ),
 ]
-DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Only say what would be reused and made.")]
-ProductArgument = Annotated[str, typer.Argument(help="Such as costvolume, disparity or confidence.")]
+DryRunOption = Annotated[
+    bool, typer.Option("--dry-run", help="Print what would be reused and what would be made, and make nothing.")
+]
+ProductArgument = Annotated[str, typer.Argument(help="A product, such as costvolume, disparity or confidence.")]
+
+
+def chosen(settings: list[str] | None, mode: str | None) -> tuple[str, ...]:
+    """Return the settings that ``--set`` and ``--mode`` give; ``--mode`` wins."""
+    return (*(settings or ()), *([f"costvolume.mode={mode}"] if mode else []))
+
+
+def config_file(config: Path | None) -> Path | None:
+    """Return the file of settings: ``--config``, else ``$PIPELINE_CONFIG``, else ``./pipeline.toml`` if it is there."""
+    named = os.environ.get("PIPELINE_CONFIG")
+    beside = Path("pipeline.toml")
+    return config or (Path(named).expanduser() if named else beside if beside.is_file() else None)

@@ -12,6 +12,7 @@ from semidense.pipeline.cli.options import (
     DryRunOption,
     ForceOption,
     JsonOption,
+    ModeOption,
     OutputOption,
     PresetOption,
     ProductArgument,
@@ -21,6 +22,8 @@ from semidense.pipeline.cli.options import (
     TrainOption,
     UptoOption,
     WorkersOption,
+    chosen,
+    config_file,
 )
 from semidense.pipeline.plan.presets import DEFAULT
 
@@ -42,6 +45,7 @@ def run(
     scene: SceneOption = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
     dry_run: DryRunOption = False,
@@ -52,12 +56,12 @@ def run(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a dataset's products, reusing all that is cached."""
+    """Make the products of a dataset; what is cached is reused."""
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
 
-    task = _task(dataset, scene, settings, config, train, cache, preset)
+    task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     if dry_run:
         return _print_plan(api.status(task, upto, forced=force or ()), as_json)
     with ProgressWatch() as watch:
@@ -73,30 +77,38 @@ def run(
 
 def sweep(
     dataset: DatasetArgument = "motorcycle",
-    thresholds: Annotated[str, typer.Option("--R", help="first:last:step, or numbers with commas.")] = "0.05:0.95:0.05",
+    thresholds: Annotated[
+        str, typer.Option("--R", help="Confidence thresholds: first:last:step, or numbers with commas.")
+    ] = "0.05:0.95:0.05",
     scene: SceneOption = None,
     settings: Annotated[
-        list[str] | None, typer.Option("--set", help="section.field=value1,value2; all combinations are made.")
+        list[str] | None,
+        typer.Option(
+            "--set", help="Try several values of a setting: section.field=value1,value2; all combinations are made."
+        ),
     ] = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Where sweep.csv and sweep.png go.")] = Path("sweep"),
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Write sweep.csv, sweep.png and sweep.json to this folder.")
+    ] = Path("sweep"),
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Filter at many thresholds R, and over other settings.
+    """Compare error and density at many thresholds R, and over other settings.
 
-    Says what was reused; --set section.field=value1,value2 tries several values of any setting.
+    --set section.field=value1,value2 tries several values of any setting.
     """
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
     from semidense.pipeline.files.run_files import write_sweep
 
-    task = _task(dataset, scene, None, config, train, cache, preset)
+    task = _task(dataset, scene, chosen(None, mode), config, train, cache, preset)
     with ProgressWatch() as watch:
         result = api.sweep(task, thresholds, settings or (), watch=watch, scheduler=scheduler, workers=workers)
     files = write_sweep(result.metrics, output)
@@ -115,15 +127,16 @@ def status(
     scene: SceneOption = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Say what is cached, and what changed if it is not."""
+    """Print which products are cached, and why the others must be made."""
     from semidense.pipeline import api
 
-    _print_plan(api.status(_task(dataset, scene, settings, config, train, cache, preset), upto), as_json)
+    _print_plan(api.status(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), upto), as_json)
 
 
 def explain(
@@ -132,21 +145,25 @@ def explain(
     scene: SceneOption = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
-    graph: Annotated[Path | None, typer.Option("--graph", help="Draw what it was made from (SVG, PNG, PDF).")] = None,
+    graph: Annotated[
+        Path | None,
+        typer.Option("--graph", help="Draw what the product was made from into this file (SVG, PNG or PDF)."),
+    ] = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what a product's key is made of.
+    """Show what a product's cache key is made of.
 
-    Also why it would be made again, and what it was made from.
+    Also shows why the product would be made again, and from what it was made.
     """
     from semidense.pipeline import api
     from semidense.pipeline.cli.explain import draw_provenance, explanation, print_explanation
     from semidense.pipeline.plan.config import preset_settings
 
-    planned = api.explain(_task(dataset, scene, settings, config, train, cache, preset), product)
+    planned = api.explain(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), product)
     found = explanation(planned, api.open_store(cache))
     found |= {"preset": {"name": preset, "settings": list(preset_settings(preset))}}
     if graph:
@@ -164,23 +181,26 @@ def inspect(
     dataset: DatasetArgument = "motorcycle",
     scene: SceneOption = None,
     png: Annotated[Path | None, typer.Option("--png", help="Draw the product into this file.")] = None,
-    pixel: Annotated[str | None, typer.Option("--pixel", help="Y,X: whose cost curve to draw.")] = None,
-    disparity: Annotated[int | None, typer.Option("--disparity", help="Which cost slice to draw, px.")] = None,
+    pixel: Annotated[str | None, typer.Option("--pixel", help="Draw the cost curve of this pixel: Y,X.")] = None,
+    disparity: Annotated[
+        int | None, typer.Option("--disparity", help="Draw the slice of costs at this disparity, px.")
+    ] = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show a cached product: its xarray, figures and picture.
+    """Show a cached product: its arrays, statistics and picture.
 
-    Also how to open it in Python. A map is drawn in terminals that can show it.
+    Also shows how to open it in Python. Terminals with colours show a map at once.
     """
     from semidense.pipeline import api
     from semidense.pipeline.cli.inspect import draw, inspection, print_inspection
 
-    planned = api.explain(_task(dataset, scene, settings, config, train, cache, preset), product)
+    planned = api.explain(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), product)
     found = inspection(planned, api.open_store(cache))
     if png:
         draw(found, png, pixel, disparity)
@@ -190,7 +210,7 @@ def inspect(
 def _task(
     dataset: str,
     scenes: list[str] | None,
-    settings: list[str] | None,
+    settings: tuple[str, ...],
     config: Path | None,
     train: bool,
     cache: Path | None,
@@ -198,7 +218,7 @@ def _task(
 ) -> "Task":
     from semidense.pipeline.api import Task
 
-    return Task(dataset, tuple(scenes or ()), tuple(settings or ()), config, train, cache, preset)
+    return Task(dataset, tuple(scenes or ()), settings, config_file(config), train, cache, preset)
 
 
 def _print_plan(plan: "Plan", as_json: bool) -> None:

@@ -13,9 +13,12 @@ from semidense.pipeline.cli.options import (
     ConfigOption,
     DatasetArgument,
     JsonOption,
+    ModeOption,
     PresetOption,
     SceneOption,
     SetOption,
+    chosen,
+    config_file,
 )
 from semidense.pipeline.plan.presets import DEFAULT
 
@@ -35,27 +38,30 @@ def report(
     scene: SceneOption = None,
     settings: SetOption = None,
     preset: PresetOption = DEFAULT,
+    mode: ModeOption = None,
     config: ConfigOption = None,
-    train: Annotated[bool, typer.Option("--train", help="Of a run that trained the networks.")] = False,
+    train: Annotated[bool, typer.Option("--train", help="Report on a run that trained the networks.")] = False,
     cache: CacheOption = None,
 ) -> None:
-    """Write one HTML file of all that is cached of a dataset.
+    """Write all cached results of a dataset into one HTML file.
 
     Figures, curves, maps, training and settings; it loads nothing and makes nothing.
     """
     from semidense.pipeline.api import Task
     from semidense.pipeline.pages.report import report as write
 
-    path = write(Task(dataset, tuple(scene or ()), tuple(settings or ()), config, train, cache, preset), output)
+    path = write(
+        Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), train, cache, preset), output
+    )
     typer.echo(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
 
 
 def view(
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="0: any that is free.")] = 5006,
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port of the page; 0 takes a free one.")] = 5006,
     show: Annotated[bool, typer.Option("--show/--no-show", help="Open the browser.")] = True,
     cache: CacheOption = None,
 ) -> None:
-    """Look into the cache in the browser.
+    """Open a page in the browser that shows the cache.
 
     Maps, confidence, threshold and cost curves together, on a page served to this machine alone.
     """
@@ -68,7 +74,7 @@ def data_list(
     dataset: Annotated[str | None, typer.Argument(help="List the scenes of this dataset.")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """List the datasets there are, or the scenes of one."""
+    """List the known datasets, or the scenes of one."""
     list_scenes(dataset, as_json) if dataset else list_datasets(as_json)
 
 

@@ -9,7 +9,8 @@ from semidense.datasets.formats.atomic import atomic_write
 from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.figures import density_figure, dots_figure, sheets
 from semidense.pipeline.comparison.tables import TITLES, at, of, quoted
-from semidense.pipeline.files.writing import explaining, save_png, table_text, writable_folder
+from semidense.pipeline.files.publishing import publishing
+from semidense.pipeline.files.writing import explaining, save_png, table_text
 from semidense.pipeline.results.metric_rows import FIGURES, THRESHOLD
 
 COLUMNS = ("experiment", "scene", "method", "mask", "threshold_px", "R", *FIGURES, "quoted", "data")
@@ -42,16 +43,17 @@ def write_comparison(found: Comparison, folder: Path, threshold: float = THRESHO
         threshold: of the figures, one of ``THRESHOLDS``, px; the other files have all.
 
     Raises:
-        UsageError: if the folder cannot be written.
+        UsageError: if the folder cannot be written, or holds a file of these names that no earlier comparison wrote.
     """
-    writable_folder(folder)
-    written = [folder / "comparison.csv", folder / "comparison.json"]
-    for name, drawn in _figures(found, threshold).items():
-        save_png(drawn, folder / name)
-        written.append(folder / name)
-    _write(written[0], table_text([*found.rows, *found.means, *quoted(found)], COLUMNS))
-    _write(written[1], json.dumps(as_json(found, written), allow_nan=False, indent=1))
-    return written
+    figures = _figures(found, threshold)
+    names = ["comparison.csv", "comparison.json", *figures]
+    with publishing(folder, "comparison.json") as draft:
+        for name, drawn in figures.items():
+            save_png(drawn, draft / name)
+        _write(draft / "comparison.csv", table_text([*found.rows, *found.means, *quoted(found)], COLUMNS))
+        document = as_json(found) | {"files": names}
+        _write(draft / "comparison.json", json.dumps(document, allow_nan=False, indent=1))
+    return [folder / name for name in names]
 
 
 def _write(path: Path, text: str) -> None:

@@ -49,6 +49,7 @@ class Quantity:
 
 
 DISPARITY = Quantity("disparity", "disparity d: x_right = x_left - d", "px", 256)
+RAW_DISPARITY = Quantity("disparity_raw", "disparity d: x_right = x_left - d; raw", "px", 256)
 RIGHT_DISPARITY = Quantity("right_disparity", "disparity d: x_left = x_right + d; raw", "px", 256, "right")
 CONFIDENCE = Quantity("confidence", "probability that the raw disparity is right, 0 to 1", "1", 65535)
 DEPTH = Quantity("depth", "depth along the optical axis", "m", 1000)
@@ -90,4 +91,14 @@ _WRITERS: Mapping[str, Callable[[Path, NDArray[np.float32], Quantity, Mapping[st
     "npy": _npy,
 }
 
-__all__ = ["CONFIDENCE", "DEPTH", "DISPARITY", "FORMATS", "RIGHT_DISPARITY", "Png16Error", "Quantity", "write_map"]
+__all__ = [
+    "CONFIDENCE",
+    "DEPTH",
+    "DISPARITY",
+    "FORMATS",
+    "RAW_DISPARITY",
+    "RIGHT_DISPARITY",
+    "Png16Error",
+    "Quantity",
+    "write_map",
+]

@@ -8,17 +8,17 @@
         matching_net.safetensors        of trained networks; also evaluation_net.safetensors
         calibration.safetensors         what the confidence was measured to be worth, if it was asked for
         SCENE/
-            disparity.pfm               raw disparity, px; infinity: none
-            disparity.png               the same in colours, black: none
-            confidence.pfm, .png        probability that the disparity is right
-            semidense.pfm, .png         disparities that are trusted; of a sweep semidense-R0.90.pfm ...
+            disparity.pfm               trusted disparities, px; infinity: none; of a sweep disparity-R0.90.pfm ...
+            disparity-colour.png        the same in colours, black: none
+            disparity_raw.pfm           raw disparities, before any was dropped; and disparity_raw-colour.png
+            confidence.pfm              probability that the raw disparity is right; and confidence-colour.png
 
 Where the variants of a sweep differ in a file's content, the settings that it depends on are in its name.
 """
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -30,8 +30,9 @@ from semidense.datasets.formats.pfm import write_pfm
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.figures.colours import confidence_rgb, disparity_rgb, disparity_span
 from semidense.pipeline.files.file_names import safe_names
+from semidense.pipeline.files.publishing import publishing, written_before
 from semidense.pipeline.files.selection import Wanted, wanted
-from semidense.pipeline.files.writing import explaining, save_png, table_text, writable_folder, write_rgb
+from semidense.pipeline.files.writing import explaining, save_png, table_text, write_rgb
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.results.metric_rows import THRESHOLD
 from semidense.pipeline.results.provenance import lineage
@@ -41,6 +42,8 @@ from semidense.stages.metrics.stage import ROW
 
 COLUMNS = ("scene", "method", "mask", "threshold_px", "R", "pixels", *ROW)
 """The columns of ``metrics.csv``: the keys of the rows that are promised to scripts."""
+CONFIG = "config.json"
+"""The record of an export."""
 _MAPS = ("disparity", "confidence", "semidense")
 _LAST = 50
 """Training steps that the final loss is a mean of."""
@@ -48,7 +51,7 @@ _Span = tuple[float, float]
 
 
 def export(result: Result, folder: Path) -> list[Path]:
-    """Write the results of a run into a folder; files that are there already are replaced, each at once.
+    """Write the results of a run into a folder, all of them or nothing; those of an earlier export are replaced.
 
     Args:
         result: of a run or a sweep. Scenes that were only trained on are left out.
@@ -59,17 +62,23 @@ def export(result: Result, folder: Path) -> list[Path]:
         The files, in the order in which they were written.
 
     Raises:
-        UsageError: if the folder is a file, or cannot be written.
+        UsageError: if the folder is a file, cannot be written, or holds a file that would be replaced and that no
+            earlier export wrote.
         CacheError: if a result is no longer in the cache.
     """
     folder = Path(folder)
-    writable_folder(folder)
-    exporter = _Exporter(result, folder)
-    exporter.write_networks()
-    exporter.write_maps()
-    exporter.write_metrics()
-    exporter.write_config()
-    return exporter.written
+    with publishing(folder, CONFIG, _read_files(result)) as draft:
+        exporter = _Exporter(result, draft)
+        exporter.write_networks()
+        exporter.write_maps()
+        exporter.write_metrics()
+        exporter.write_config(written_before(folder, CONFIG))
+    return [folder / path.relative_to(draft) for path in exporter.written]
+
+
+def _read_files(result: Result) -> list[Path]:
+    """Return the files of the scenes that a run read."""
+    return [path for made in result.made.values() for path in getattr(made.step.argument, "files", {}).values()]
 
 
 @dataclass
@@ -100,11 +109,10 @@ class _Exporter:
 
     def _write_map(self, each: Wanted) -> None:
         folder = self.folder / self.scenes[each.made.step.scene]
-        writable_folder(folder)
+        folder.mkdir(exist_ok=True)
         values = self._read(each.made, "confidence" if each.product == "confidence" else "disparity")
-        pfm, png = (folder / f"{each.stem}.{suffix}" for suffix in ("pfm", "png"))
-        with explaining(pfm):
-            write_pfm(pfm, values)
+        pfm, png = (folder / f"{each.stem}{end}" for end in (".pfm", "-colour.png"))
+        write_pfm(pfm, values)
         colours = confidence_rgb(values) if each.product == "confidence" else disparity_rgb(values, *self._span(each))
         write_rgb(colours, png)
         self.written += [pfm, png]
@@ -126,11 +134,12 @@ class _Exporter:
             write_rows(self.result.metrics, path)
             self.written.append(path)
 
-    def write_config(self) -> None:
-        """Write the command, the versions, and the settings that each result was made with."""
+    def write_config(self, earlier: Iterable[str]) -> None:
+        """Write the command, the versions, the settings that each result was made with, and all files there are."""
         targets = [self._described(*target) for target in self.result.plan.targets]
-        document = provenance(sys.argv) | {"configuration": targets}
-        self._write(self.folder / "config.json", (json.dumps(document, indent=2) + "\n").encode())
+        files = {path.relative_to(self.folder).as_posix() for path in self.written} | {*earlier, CONFIG}
+        document = provenance(sys.argv) | {"configuration": targets, "files": sorted(files)}
+        self._write(self.folder / CONFIG, (json.dumps(document, indent=2) + "\n").encode())
 
     def _described(self, step_id: str, variant: str) -> dict[str, Any]:
         """Return the settings and keys of a result and of everything it was made from."""
@@ -190,20 +199,23 @@ def write_rows(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
 
 
 def write_sweep(rows: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
-    """Write ``sweep.csv`` with every row and ``sweep.png`` with the curve; return their paths.
+    """Write ``sweep.csv`` with every row, ``sweep.png`` with the curve and ``sweep.json``; return their paths.
 
     Where no threshold keeps a pixel, or another wish than R decides, there is no curve, and no picture.
+    ``sweep.json`` tells command and versions, and names the files.
 
     Raises:
-        UsageError: if the folder cannot be written.
+        UsageError: if the folder cannot be written, or holds a file of these names that no earlier sweep wrote.
     """
     from semidense.pipeline.figures.curves import error_curve_figure  # Matplotlib takes a second to load
 
-    writable_folder(folder)
-    table, picture = folder / "sweep.csv", folder / "sweep.png"
-    write_rows(rows, table)
-    picture.unlink(missing_ok=True)
-    if not any("bad" in row and "R" in row for row in rows):
-        return [table]
-    save_png(error_curve_figure(rows, threshold=THRESHOLD), picture)
-    return [table, picture]
+    with publishing(folder, "sweep.json", obsolete={"sweep.png"}) as draft:
+        write_rows(rows, draft / "sweep.csv")
+        names = ["sweep.csv"]
+        if any("bad" in row and "R" in row for row in rows):
+            save_png(error_curve_figure(rows, threshold=THRESHOLD), draft / "sweep.png")
+            names.append("sweep.png")
+        names.append("sweep.json")
+        document = provenance(sys.argv) | {"files": names}
+        (draft / "sweep.json").write_text(json.dumps(document, indent=2) + "\n")
+    return [folder / name for name in names]

@@ -10,6 +10,8 @@ from semidense.pipeline.results.provenance import lineage
 from semidense.pipeline.results.result import Result
 
 _THRESHOLD = "semidense.R="
+_STEMS = {"disparity": "disparity_raw", "semidense": "disparity"}
+"""Names of files that are not the product's: as ``match`` has them, ``disparity`` is the map that is trusted."""
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,7 @@ class Wanted:
 
     Attributes:
         made: the result.
-        stem: the start of its file's name: the product; in a sweep also the settings that set it apart.
+        stem: the start of its file's name; in a sweep with the settings that set it apart.
     """
 
     made: Made
@@ -53,9 +55,10 @@ def wanted(result: Result, products: Sequence[str]) -> list[Wanted]:
 
 def _stems(made: Mapping[str, Made], product: str, variants: Mapping[str, str]) -> dict[str, str]:
     """Return the start of a file's name for each of the results of one product and scene."""
+    stem = _STEMS.get(product, product)
     if len(variants) == 1:
-        return dict.fromkeys(variants, product)
-    names = {step_id: f"{product}-{_differences(made, step_id, variant)}" for step_id, variant in variants.items()}
+        return dict.fromkeys(variants, stem)
+    names = {step_id: f"{stem}-{_differences(made, step_id, variant)}" for step_id, variant in variants.items()}
     safe = safe_names(names.values())
     return {step_id: safe[name] for step_id, name in names.items()}
 

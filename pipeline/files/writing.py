@@ -62,8 +62,8 @@ def save_png(figure: "Figure", path: Path) -> None:
         figure.savefig(file, format="png")
 
 
-def write_rgb(rgb: NDArray[np.uint8], path: Path) -> None:
-    """Write colours (y, x, 3) uint8 as a PNG of the same number of pixels; an existing file is replaced.
+def write_rgb(rgb: NDArray[np.uint8] | NDArray[np.uint16], path: Path) -> None:
+    """Write colours (y, x, 3) of 8 bits, or gray (y, x) of 8 or 16 bits, as a PNG; an existing file is replaced.
 
     Raises:
         UsageError: if the file cannot be written.

@@ -5,7 +5,8 @@
     FOLDER/
         summary.json            parameters, versions, timings, density, warnings, and what each file holds
         disparity.*             the map: .pfm (none: infinity), .png (KITTI's 16 bits, none: 0), .tif, .npy (none: NaN)
-        disparity-colour.png    the same with a legend
+        disparity-colour.png    the same as a picture with a legend
+        disparity_raw.*         the map before anything was dropped or refined, and disparity_raw-colour.png
         confidence.*            the same formats, and confidence-colour.png
         depth.*                 with a calibration: metres (16-bit PNG: millimetres)
         points.ply              with a calibration: the coloured points, right side up
@@ -13,23 +14,21 @@
         guessed.png             if holes were filled: white where
         survey.png              if something looks wrong with the pair: where
 
-The files are made in a hidden folder beside their place and moved when all of them are there. Those of an earlier match
-that this one does not write are deleted.
+The files are made in a hidden folder beside their place and moved when all of them are there. Files of an earlier match
+are replaced or deleted. The pair's own files, and files that ``summary.json`` does not name, are refused.
 """
 
 import json
 import os
-import secrets
-import shutil
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from semidense.datasets import SceneSource
 from semidense.datasets.formats.ply import write_ply
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.files.file_names import safe_names
@@ -39,21 +38,31 @@ from semidense.pipeline.files.map_files import (
     DISPARITY,
     ENDINGS,
     FORMATS,
+    RAW_DISPARITY,
     RIGHT_DISPARITY,
     Png16Error,
     Quantity,
     write_map,
 )
-from semidense.pipeline.files.writing import explaining, writable_folder, write_rgb
+from semidense.pipeline.files.publishing import publishing, refuse_foreign
+from semidense.pipeline.files.writing import write_rgb
 from semidense.pipeline.pairs.match import Match
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.opening import open_product
 from semidense.stages.evaluation.calibration.table import told
 
 _SUMMARY = "summary.json"
-_QUANTITIES = (DISPARITY, CONFIDENCE, DEPTH, RIGHT_DISPARITY)
-_PICTURES = {"disparity-colour.png", "confidence-colour.png", "guessed.png", "survey.png", "points.ply"}
+_QUANTITIES = (DISPARITY, RAW_DISPARITY, CONFIDENCE, DEPTH, RIGHT_DISPARITY)
+_PICTURES = {
+    "disparity-colour.png",
+    "disparity_raw-colour.png",
+    "confidence-colour.png",
+    "guessed.png",
+    "survey.png",
+    "points.ply",
+}
 """What is written beside the maps."""
+_ALL = {f"{each.name}.{ending}" for each in _QUANTITIES for ending in ENDINGS.values()} | _PICTURES
 _POINTS = "x right, y up, z towards the viewer; metres, from the left camera"
 
 
@@ -64,73 +73,47 @@ def save_all(matches: Sequence[Match], folder: Path, formats: Sequence[str] = FO
         The summaries, as ``summary.json`` holds them.
 
     Raises:
-        UsageError: if the folder cannot be written; nothing of a pair that could not be written whole is left.
+        UsageError: if the folder cannot be written, or holds a file of somebody else that would be replaced; nothing
+            of a pair that could not be written whole is left.
         CacheError: if a result is no longer in the cache.
     """
-    names = safe_names(match.scene.name for match in matches)
-    places = [folder if len(matches) == 1 else folder / names[match.scene.name] for match in matches]
-    return [save(match, place, formats) for match, place in zip(matches, places, strict=True)]
+    places = _places([match.scene for match in matches], folder)
+    return [save(match, places[match.scene.name], formats) for match in matches]
 
 
-def require_place(folder: Path) -> None:
+def _places(scenes: Sequence[SceneSource], folder: Path) -> dict[str, Path]:
+    names = safe_names(scene.name for scene in scenes)
+    return {name: folder if len(scenes) == 1 else folder / safe for name, safe in names.items()}
+
+
+def require_place(scenes: Sequence[SceneSource], folder: Path, formats: Sequence[str] = FORMATS) -> None:
     """Refuse a folder that cannot be written, without making it: matching takes long.
 
     Raises:
-        UsageError: if it, or the nearest folder above it that there is, is a file or closed to this user.
+        UsageError: if it, or the nearest folder above it that there is, is a file or closed to this user; or if a file
+            of the pair, or of somebody else, would be replaced.
     """
     place = next(each for each in (folder, *folder.absolute().parents) if each.exists())
     if not place.is_dir():
         raise UsageError(f"{folder}: cannot be written ({place} is a file); name another place")
     if not os.access(place, os.W_OK | os.X_OK):
         raise UsageError(f"{folder}: cannot be written (no permission in {place}); name another place")
+    inputs = [path for scene in scenes for path in scene.files.values()]
+    endings = {ENDINGS[kind] for kind in formats}
+    maps = {f"{each.name}.{ending}" for each in _QUANTITIES for ending in endings}
+    for each in _places(scenes, folder).values():
+        refuse_foreign(each, _SUMMARY, maps | _PICTURES | {_SUMMARY}, inputs)
 
 
 def save(match: Match, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Any]:
     """Write one pair; as `save_all`."""
-    writable_folder(folder)
-    with explaining(folder), _draft(folder) as draft:
+    with publishing(folder, _SUMMARY, match.scene.files.values(), _ALL) as draft:
         writer = _Writer(match, draft, formats)
         writer.write_maps()
         writer.write_pictures()
         writer.write_points()
         summary = writer.write_summary()
-        _publish(draft, folder)
     return summary | {"folder": str(folder)}
-
-
-@contextmanager
-def _draft(folder: Path) -> Iterator[Path]:
-    """Make a hidden folder inside another one, which is gone in the end."""
-    draft = folder / f".match-{secrets.token_hex(4)}"
-    draft.mkdir()
-    try:
-        yield draft
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
-
-
-def _publish(draft: Path, folder: Path) -> None:
-    """Move the files to their place, the summary last; what only an earlier match wrote goes.
-
-    So a folder with a summary holds what it names, of one match; without one, a match was cut short.
-    """
-    earlier, names = _written_before(folder), {path.name for path in draft.iterdir()} - {_SUMMARY}
-    (folder / _SUMMARY).unlink(missing_ok=True)
-    for name in sorted(names):
-        (draft / name).replace(folder / name)
-    for name in sorted(earlier - names):
-        (folder / name).unlink(missing_ok=True)
-    (draft / _SUMMARY).replace(folder / _SUMMARY)
-
-
-def _written_before(folder: Path) -> set[str]:
-    """Return the files that an earlier match wrote, as its summary has it; only names that a match writes count."""
-    maps = {f"{each.name}.{ending}" for each in _QUANTITIES for ending in ENDINGS.values()}
-    try:
-        listed = json.loads((folder / _SUMMARY).read_text())["files"]
-        return {each["file"] for each in listed} & (maps | _PICTURES)
-    except (OSError, ValueError, LookupError, TypeError, RecursionError):
-        return set()
 
 
 @dataclass
@@ -146,6 +129,7 @@ class _Writer:
     def write_maps(self) -> None:
         """Write every map of numbers."""
         self._write(DISPARITY, self.match.disparity)
+        self._write(RAW_DISPARITY, self.match.raw)
         self._write(CONFIDENCE, self.match.confidence)
         if self.match.scene.calibration:
             self._write(DEPTH, self.match.depth)
@@ -164,6 +148,7 @@ class _Writer:
     def write_pictures(self) -> None:
         """Write what is for the eye."""
         self._draw(self.match.wishes.product, "disparity-colour.png")
+        self._draw("disparity", "disparity_raw-colour.png")
         self._draw(self.match.wishes.confidence, "confidence-colour.png")
         if self.match.wishes.fill:
             write_rgb(

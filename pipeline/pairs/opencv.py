@@ -1,14 +1,25 @@
 """A drop-in for those who call OpenCV's ``StereoSGBM``."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.pipeline.pairs.match import Match, match
+from semidense.pipeline.api import Task
+from semidense.pipeline.pairs.match import Wishes, match
+from semidense.pipeline.plan.config import Settings, nearest, setting_texts
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.presets import DEFAULT
+
+_WISHES = tuple(field.name for field in fields(Wishes))
+_WITHOUT_COUNTERPART = (
+    *("blockSize", "P1", "P2", "preFilterCap", "preFilterType", "preFilterSize", "textureThreshold"),
+    *("uniquenessRatio", "speckleWindowSize", "speckleRange", "mode"),
+)
+"""OpenCV's parameters of matchers that work in another way."""
 
 
 class StereoMatcher:
@@ -17,6 +28,8 @@ class StereoMatcher:
     As in OpenCV, colour images are in the order blue, green, red, and disparities lie in ``minDisparity`` to
     ``minDisparity + numDisparities - 1``. Not as in OpenCV, a map is float32 in pixels (not 16 times as much in int16),
     with NaN for "none" (not ``minDisparity - 1``).
+
+    A matcher can be copied and pickled, with the confidence of its last ``compute``.
 
     >>> StereoMatcher(minDisparity=-4, numDisparities=64, R=0.8).getNumDisparities()
     64
@@ -27,31 +40,42 @@ class StereoMatcher:
         minDisparity: int = 0,
         numDisparities: int = 64,
         *,
-        R: float | None = None,
-        density: float | None = None,
-        settings: Sequence[str] = (),
+        disp12MaxDiff: float = -1,
+        settings: Settings = (),
+        preset: str = DEFAULT,
         cache: Path | str | None = None,
         **wishes: Any,  # noqa: ANN401 - those of Wishes
     ) -> None:
-        """Set what to search and what to keep.
+        """Set what to search and what to keep. All of it is checked here, before any image is there.
 
         Args:
-            minDisparity: px.
+            minDisparity: px, a whole number.
             numDisparities: how many, from 1; no multiple of 16 is needed.
-            R: least confidence that is kept; by default 0.9.
-            density: share of the pixels to keep instead.
-            settings: ``section.field=value`` of the configuration.
+            disp12MaxDiff: drop disparities that the right view's map contradicts by more than this, px; below 0: none.
+            settings: ``section.field=value`` of the configuration, over those of the preset.
+            preset: named settings to start from.
             cache: the cache's folder.
-            **wishes: further attributes of ``semidense.pipeline.pairs.match.Wishes``, such as ``subpixel=True``.
+            **wishes: attributes of ``semidense.pipeline.pairs.match.Wishes``, such as ``R=0.8``, ``density=0.5`` or
+                ``subpixel=True``.
 
         Raises:
-            UsageError: if there is no disparity to search.
+            UsageError: if a name is unknown, a value is not valid, or OpenCV's parameter has no counterpart here.
         """
-        if numDisparities < 1:
-            raise UsageError(f"numDisparities is {numDisparities}; it must be at least 1")
-        self._range = range(minDisparity, minDisparity + numDisparities)
-        self._how: dict[str, Any] = {"settings": settings, "cache": cache, "R": R, "density": density, **wishes}
-        self._found: Match | None = None
+        low, count = _whole("minDisparity", minDisparity), _whole("numDisparities", numDisparities)
+        if count < 1:
+            raise UsageError(f"numDisparities is {count}; it must be at least 1")
+        _refuse_unknown(wishes)
+        if disp12MaxDiff >= 0:
+            wishes |= {"left_right": True, "tolerance": float(disp12MaxDiff)}
+        Task(settings=settings, preset=preset).and_settings(Wishes(**wishes).settings).configuration()
+        self._range = range(low, low + count)
+        self._how: dict[str, Any] = {
+            "settings": setting_texts(settings),
+            "preset": preset,
+            "cache": cache,
+            **wishes,
+        }
+        self._confidence: NDArray[np.float32] | None = None
 
     @classmethod
     def create(cls, *arguments: Any, **named: Any) -> Self:  # noqa: ANN401
@@ -68,8 +92,9 @@ class StereoMatcher:
         Raises:
             DatasetError: if an array is no image, or the two do not fit together.
         """
-        self._found = match(_rgb(left), _rgb(right), d_min=self._range[0], d_max=self._range[-1], **self._how)
-        return self._found.disparity
+        found = match(_rgb(left), _rgb(right), d_min=self._range[0], d_max=self._range[-1], **self._how)
+        self._confidence = found.confidence
+        return found.disparity
 
     @property
     def confidence(self) -> NDArray[np.float32]:
@@ -78,9 +103,9 @@ class StereoMatcher:
         Raises:
             UsageError: before the first ``compute``.
         """
-        if self._found is None:
+        if self._confidence is None:
             raise UsageError("there is no confidence before compute(left, right)")
-        return self._found.confidence
+        return self._confidence
 
     def getMinDisparity(self) -> int:  # noqa: N802 - OpenCV's name
         """Return the smallest disparity, px."""
@@ -89,6 +114,30 @@ class StereoMatcher:
     def getNumDisparities(self) -> int:  # noqa: N802
         """Return how many disparities are searched."""
         return len(self._range)
+
+
+def _whole(name: str, value: object) -> int:
+    """Return a whole number that was given as Python's or NumPy's, or as 64.0.
+
+    Raises:
+        UsageError: if it is none.
+    """
+    if isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool):
+        number = float(value)
+        if number.is_integer():
+            return int(number)
+    raise UsageError(f"{name} is {value!r}; it must be a whole number")
+
+
+def _refuse_unknown(wishes: Mapping[str, object]) -> None:
+    for name in wishes:
+        if name in _WITHOUT_COUNTERPART:
+            raise UsageError(
+                f"{name} of OpenCV has no counterpart here: the networks decide what matches; leave it out"
+            )
+        if name not in _WISHES:
+            known = ("minDisparity", "numDisparities", "disp12MaxDiff", "settings", "preset", "cache", *_WISHES)
+            raise UsageError(f"StereoMatcher has no parameter {name!r}; {nearest(name, known)}")
 
 
 def _rgb(view: NDArray[Any]) -> NDArray[Any]:

@@ -4,14 +4,16 @@ A change of an input is followed to what made that input different, so every ste
 """
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from semidense.cache import Change, Entry, Store, differences
+from semidense.cache import ABSENT, Change, Entry, Store, differences
 from semidense.cache.entries.index import Index
 from semidense.cache.keys.code import source_text
 from semidense.cache.keys.recipe import is_hash
 from semidense.cache.keys.sources import source_change
+from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.steps import Step
 
 PENDING = "to be made again"
@@ -59,7 +61,7 @@ class Causes:
         if change.field == "params.shipped":
             return f"weights of {product}: {_values(change)}"
         if part == "params":
-            return f"{product}.{name}: {_values(change)}"
+            return f"{product}.{name}: {_values(_in_words(product, name, change))}"
         if part == "environment":
             return f"{name}: {_values(change)}"
         return "asked for by --force" if part == "forced" else str(change)
@@ -101,6 +103,15 @@ def _pairs(old: object, new: object) -> Iterator[tuple[str, str]]:
         yield from [(str(a), str(b)) for a, b in zip(old, new, strict=True) if a != b][:1]
     else:
         yield f"{len(old) if isinstance(old, list) else 0} scenes", f"{len(new) if isinstance(new, list) else 0} scenes"
+
+
+def _in_words(product: str, name: str, change: Change) -> Change:
+    """Return a change with the default in place of a setting that a recipe leaves out."""
+    field = type(Config.load().section(product)).model_fields.get(name)
+    if field is None or field.is_required():
+        return change
+    old, new = (field.default if value == ABSENT else value for value in (change.old, change.new))
+    return replace(change, old=old, new=new)
 
 
 def _values(change: Change) -> str:

@@ -25,6 +25,8 @@ Settings = Mapping[str, object] | Iterable[str] | str
 """Settings as people type them: ``{"semidense.R": 0.8}``, ``"semidense.R=0.8"`` or several of the latter."""
 _VALUE = re.compile(r'(?:\[[^\]]*\]|"[^"]*"|[^,])+')
 """One of several values."""
+_FILLED_IN = {"d_min", "d_max", "fold_of_scene"}
+"""Settings that a run finds for each scene, unless they are set."""
 CHOICES = ("weights", "use")
 """Sections with a field a product, each empty by default."""
 
@@ -92,7 +94,7 @@ class Config(BaseModel):
             UsageError: if the file cannot be read, a name is unknown (the nearest is given) or a value
                 is not of the field's type and range.
         """
-        tree = _read_toml(file) if file else {}
+        tree = _read_file(file) if file else {}
         model = _model(tuple(STAGES))
         for setting in preset_settings(preset):
             _merge(tree, setting, model, over=False)
@@ -125,6 +127,35 @@ def _choices(name: str, products: Iterable[str]) -> type[Params]:
         product: (str | None, Field(None, description=told.format(product))) for product in products
     }
     return create_model(name, __base__=Params, **fields)
+
+
+def _read_file(file: Path) -> dict[str, Any]:
+    """Return the sections of a TOML file, or of the ``config.json`` that a run wrote."""
+    return _read_exported(file) if file.suffix == ".json" else _read_toml(file)
+
+
+def _read_exported(file: Path) -> dict[str, Any]:
+    """Return the settings of a ``config.json``; ranges of disparities are left out: each scene has its own."""
+    try:
+        found = [_set_by_users(each["settings"]) for each in json.loads(file.read_text())["configuration"]]
+    except OSError as error:
+        raise UsageError(f"configuration {file}: {error.strerror}") from None
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        raise UsageError(f"configuration {file}: it is no config.json that run --output wrote") from None
+    if not found or any(each != found[0] for each in found):
+        raise UsageError(f"configuration {file}: it holds {len(found)} sets of settings that differ; give a TOML file")
+    return found[0]
+
+
+def _set_by_users(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return those of the settings of steps that a configuration has and that no run fills in by itself."""
+    known = _model(tuple(STAGES)).model_fields
+    taken = {name: getattr(known[name].annotation, "model_fields", {}).keys() - _FILLED_IN for name in known}
+    return {
+        name: {field: value for field, value in fields.items() if field in taken[name]}
+        for name, fields in settings.items()
+        if name in known
+    }
 
 
 def _read_toml(file: Path) -> dict[str, Any]:

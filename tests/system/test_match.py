@@ -107,7 +107,7 @@ def test_a_bad_picture_is_one_line_and_leaves_nothing(
         pytest.param(["{}/im0.png", "{}/im1.png", "--R", "0.5", "--density", "50%"], ["one of them"], id="both"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--max-error", "2", "--R", "1"], ["such as 2%"], id="200 % error"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--format", "jpeg"], ["no format 'jpeg'"], id="no such format"),
-        pytest.param(["{}/im0.png", "{}/im1.png", "--calib", "{}/im0.png"], ["not plain text"], id="a picture"),
+        pytest.param(["{}/im0.png", "{}/im1.png", "--calib", "{}/im0.png"], ["not plain text"], id="picture as calib"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--calib", "{}/none"], ["none"], id="no calibration there"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--calib", "{}/calib.txt", "--unit", "ft"], ["mm, cm, m"], id="unit"),
     ],
@@ -128,6 +128,29 @@ def refused(invoke: Invoke, tmp_path: Path, arguments: list[Any], words: list[st
     assert not (tmp_path / "out").exists()
     assert not list((tmp_path / "cache").glob("records/*/*"))
     assert not list((tmp_path / "cache").glob("drafts/*"))
+
+
+def test_outputs_that_would_overwrite_the_inputs_are_refused(invoke: Invoke, pair: Path, tmp_path: Path) -> None:
+    before = {}
+    for old, new in (("im0.png", "disparity.png"), ("im1.png", "confidence.png")):
+        (pair / old).rename(pair / new)
+        before[new] = (pair / new).read_bytes()
+    views = pair / "disparity.png", pair / "confidence.png"
+    ran = invoke("match", *views, "--max-disp", "3", "-o", pair, "--cache", tmp_path / "cache")
+    assert (ran.code, ran.out) == (2, "")
+    assert "confidence.png: the command reads this file and would overwrite it" in ran.err
+    assert {name: (pair / name).read_bytes() for name in before} == before
+    assert not (tmp_path / "cache").exists()
+
+
+def test_a_file_that_no_match_wrote_is_kept(invoke: Invoke, pair: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "disparity.pfm").write_text("mine")
+    command = ["match", pair / "im0.png", pair / "im1.png", "--max-disp", "3", "-o", tmp_path / "out"]
+    ran = invoke(*command, "--cache", tmp_path / "cache")
+    assert (ran.code, ran.out) == (2, "")
+    assert "disparity.pfm: this file was not written by an earlier command" in ran.err
+    assert (tmp_path / "out" / "disparity.pfm").read_text() == "mine"
 
 
 def test_a_place_that_cannot_be_written_is_told_before_anything_is_made(

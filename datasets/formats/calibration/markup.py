@@ -8,6 +8,12 @@ from xml.etree import ElementTree
 from semidense.datasets.errors import CalibrationError
 
 
+def markup_values(path: Path, text: str) -> dict[str, Any]:
+    """Read XML or JSON, told by its first sign, else YAML; raises `CalibrationError` if it is not valid."""
+    readers = {"<": xml_values, "{": json_values}
+    return readers.get(text.lstrip()[:1], yaml_values)(path, text)
+
+
 def yaml_values(path: Path, text: str) -> dict[str, Any]:
     """Read the first document of a YAML text: ``ros2 topic echo`` ends each with ``---``; OpenCV tags its matrices.
 

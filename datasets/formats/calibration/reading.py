@@ -9,7 +9,7 @@ from semidense.datasets.formats.calibration.cameras import MILLIMETRES, Cameras,
 from semidense.datasets.formats.calibration.intrinsics import intrinsics_cameras, numbers_only
 from semidense.datasets.formats.calibration.key_values import key_value_cameras
 from semidense.datasets.formats.calibration.kitti import is_kitti, kitti_cameras
-from semidense.datasets.formats.calibration.markup import json_values, xml_values, yaml_values
+from semidense.datasets.formats.calibration.markup import markup_values
 from semidense.datasets.formats.calibration.matrices import matrices_cameras
 from semidense.datasets.formats.calibration.middlebury import middlebury_cameras
 from semidense.datasets.formats.calibration.ros import ros_cameras
@@ -45,13 +45,8 @@ def read_cameras(files: Sequence[Path], unit: str | None = None, folder: str | N
 
 
 def _single(path: Path, text: str, folder: str | None) -> Cameras:
-    start = text.lstrip()[:5]
-    if start.startswith("<"):
-        return matrices_cameras(path, xml_values(path, text))
-    if start.startswith("{"):
-        return matrices_cameras(path, json_values(path, text))
-    if start == "%YAML":
-        return matrices_cameras(path, yaml_values(path, text))
+    if text.lstrip().startswith(("<", "{", "%YAML")):
+        return matrices_cameras(path, markup_values(path, text))
     return _plain(path, text, folder)
 
 

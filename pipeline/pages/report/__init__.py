@@ -3,6 +3,10 @@
 from pathlib import Path
 
 from semidense.pipeline.api import Task
+from semidense.pipeline.plan.errors import UsageError
+
+_START = 1000
+"""Bytes in which a report says what wrote it."""
 
 
 def report(task: Task | str = "motorcycle", output: Path | str = "report.html") -> Path:
@@ -10,10 +14,10 @@ def report(task: Task | str = "motorcycle", output: Path | str = "report.html") 
 
     Args:
         task: what to report on; a text is a dataset.
-        output: the file; an existing one is replaced, at once.
+        output: the file; an existing report is replaced, at once.
 
     Raises:
-        UsageError: if nothing of it is cached, or the file cannot be written.
+        UsageError: if nothing of it is cached, the file cannot be written, or it is there and no report.
         DatasetError, CacheError: what the user can mend, in one line.
     """
     from semidense.datasets.formats.atomic import atomic_write
@@ -22,7 +26,20 @@ def report(task: Task | str = "motorcycle", output: Path | str = "report.html") 
     from semidense.pipeline.pages.report.page import page
 
     path = Path(output)
+    _refuse_foreign(path)
     document = page(gather(Task(task) if isinstance(task, str) else task)).encode()
     with explaining(path), atomic_write(path) as file:
         file.write(document)
     return path
+
+
+def _refuse_foreign(path: Path) -> None:
+    """Refuse to replace a file that is no report."""
+    from semidense.pipeline.pages.report.page import GENERATOR
+
+    if path.is_file():
+        with path.open("rb") as file:
+            if GENERATOR.encode() not in file.read(_START):
+                raise UsageError(
+                    f"{path}: this file is no report of this program; move it, or name another file with -o"
+                )

@@ -32,6 +32,9 @@ _CURVE = tuple(percent / 100 for percent in range(0, 100, 5))
 """The thresholds R of the curve."""
 _CURVE_CAPTION = "The points of the curve, of several scenes their mean; - where a scene keeps no pixel"
 
+GENERATOR = '<meta name="generator" content="semidense-stereo">'
+"""By this a report is known."""
+
 
 def page(found: Gathered) -> str:
     """Return the whole page as one HTML text that loads no other file."""
@@ -55,7 +58,7 @@ def _resource(name: str) -> str:
 def _head(title: str) -> Html:
     policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
     return (
-        f'<head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{policy}">'
+        f'<head><meta charset="utf-8">{GENERATOR}<meta http-equiv="Content-Security-Policy" content="{policy}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
         f"<title>{text(title)}</title><style>{_resource('report.css')}</style></head>"
     )

@@ -153,3 +153,13 @@ def test_a_sweep_shows_means_and_a_dash_for_what_a_scene_lacks(capsys: pytest.Ca
         ["mean", "of", "2", "1", "0.5", "20.00", "4.00"],
         ["mean", "of", "2", "1", "0.9", "20.00", "-"],
     ]
+
+
+def test_a_cause_is_told_once_and_then_by_the_product_that_told_it() -> None:
+    first = Planned(STEP, "stale", causes=("ramp.window: 31 -> 15",))
+    below = Planned(step(SUM), "stale", causes=("ramp.window: 31 -> 15", "total.own: 1 -> 2"))
+    tellers: dict[str, str] = {}
+    assert console.why(first, tellers) == "ramp.window: 31 -> 15"
+    assert console.why(first, tellers) == "ramp.window: 31 -> 15", "of another scene"
+    assert console.why(below, tellers) == f"total.own: 1 -> 2; because of {STEP.product}"
+    assert console.why(below) == "ramp.window: 31 -> 15; total.own: 1 -> 2"

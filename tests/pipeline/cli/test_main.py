@@ -75,7 +75,9 @@ def test_run_writes_where_it_is_told(invoke: Invoke, there: list[str], tmp_path:
     ran = invoke("run", *there, "--output", tmp_path / "out", "--json")
     files = [Path(file) for file in only_object(ran.out)["files"]]
     assert all(file.is_file() for file in files)
-    assert {"disparity.pfm", "disparity.png", "confidence.png", "semidense.pfm"} <= {file.name for file in files}
+    assert {"disparity.pfm", "disparity-colour.png", "confidence-colour.png", "disparity_raw.pfm"} <= {
+        file.name for file in files
+    }
     said = invoke("run", *there, "-o", tmp_path / "out").out.splitlines()
     assert [line.removeprefix("wrote ") for line in said if line.startswith("wrote ")] == list(map(str, files))
 
@@ -101,7 +103,7 @@ def test_sweep_writes_a_table_and_a_curve(invoke: Invoke, own_cache: Path, tmp_p
     ran = invoke(*arguments, "--R", "0,0.9")
     assert ran.code == 0
     assert ran.out.splitlines()[-1] == "reused 27 products, made 1 semidense, 1 metrics"
-    assert sorted(path.name for path in (tmp_path / "s").iterdir()) == ["sweep.csv", "sweep.png"]
+    assert sorted(path.name for path in (tmp_path / "s").iterdir()) == ["sweep.csv", "sweep.json", "sweep.png"]
     found = only_object(invoke(*arguments, "--R", "0,0.9", "--json").out)
     assert {row["R"] for row in found["metrics"]} == {0, 0.9}
     assert {row["state"] for row in found["steps"]} == {"hit"}

@@ -16,7 +16,7 @@ def rows(trained: Result) -> list[dict[str, object]]:
 
 
 def test_the_table_has_every_row(rows: list[dict[str, object]], tmp_path: Path) -> None:
-    table, picture = write_sweep(rows, tmp_path / "new" / "folder")
+    table, picture, _ = write_sweep(rows, tmp_path / "new" / "folder")
     written = list(csv.DictReader(table.read_text().splitlines()))
     assert len(written) == len(rows)
     assert [float(row["R"]) for row in written] == [row["R"] for row in rows]
@@ -26,7 +26,7 @@ def test_the_table_has_every_row(rows: list[dict[str, object]], tmp_path: Path) 
 def test_without_a_pixel_kept_there_is_no_picture(rows: list[dict[str, object]], tmp_path: Path) -> None:
     write_sweep(rows, tmp_path)
     nothing = [{name: value for name, value in row.items() if name != "bad"} for row in rows]
-    assert write_sweep(nothing, tmp_path) == [tmp_path / "sweep.csv"]
+    assert write_sweep(nothing, tmp_path) == [tmp_path / "sweep.csv", tmp_path / "sweep.json"]
     assert not (tmp_path / "sweep.png").exists(), "not the one of an earlier sweep"
 
 
@@ -34,7 +34,7 @@ def test_where_something_else_than_a_threshold_decides_there_is_no_picture(
     rows: list[dict[str, object]], tmp_path: Path
 ) -> None:
     wished = [{name: value for name, value in row.items() if name != "R"} for row in rows]
-    assert write_sweep(wished, tmp_path) == [tmp_path / "sweep.csv"]
+    assert write_sweep(wished, tmp_path) == [tmp_path / "sweep.csv", tmp_path / "sweep.json"]
 
 
 def test_a_line_says_which_settings_it_is_of(rows: list[dict[str, object]], capsys: pytest.CaptureFixture[str]) -> None:

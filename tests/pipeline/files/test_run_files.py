@@ -119,9 +119,9 @@ def test_a_run_leaves_its_maps_rows_and_configuration(run: Run, tmp_path: Path) 
     run.rows.append(row())
     folder = tmp_path / "a" / "out"
     written = export(run.result(), folder)
-    maps = [f"trainingQ_Teddy/{name}" for name in ("disparity", "confidence", "semidense")]
+    maps = [f"trainingQ_Teddy/{name}" for name in ("disparity_raw", "confidence", "disparity")]
     assert names(written, folder) == [
-        *(f"{name}.{suffix}" for name in maps for suffix in ("pfm", "png")),
+        *(f"{name}{end}" for name in maps for end in (".pfm", "-colour.png")),
         *("metrics.csv", "config.json"),
     ]
     assert sorted(written) == sorted(path for path in folder.rglob("*") if path.is_file())
@@ -131,7 +131,7 @@ def test_maps_come_back_as_they_were(run: Run, tmp_path: Path) -> None:
     run.target(run.scene("Teddy", *run.nets()), 0.5)
     export(run.result(), tmp_path / "out")
     semidense = np.array([[N, 20, N], [N, 40, 50]], np.float32)
-    for name, expected in (("disparity", RAW), ("confidence", CONFIDENCE), ("semidense", semidense)):
+    for name, expected in (("disparity_raw", RAW), ("confidence", CONFIDENCE), ("disparity", semidense)):
         np.testing.assert_array_equal(read_pfm(tmp_path / "out" / "Teddy" / f"{name}.pfm"), expected)
 
 
@@ -139,7 +139,8 @@ def test_pictures_of_raw_and_filtered_map_share_their_colours(run: Run, tmp_path
     run.target(run.scene("Teddy", *run.nets()), 0.5)
     export(run.result(), tmp_path)
     raw, filtered, confidence = (
-        np.asarray(Image.open(tmp_path / "Teddy" / f"{name}.png")) for name in ("disparity", "semidense", "confidence")
+        np.asarray(Image.open(tmp_path / "Teddy" / f"{name}-colour.png"))
+        for name in ("disparity_raw", "disparity", "confidence")
     )
     np.testing.assert_array_equal(raw, disparity_rgb(RAW, 10, 50))
     np.testing.assert_array_equal(filtered[0, 1], raw[0, 1])
@@ -153,8 +154,8 @@ def test_a_sweep_over_thresholds_names_only_what_differs(run: Run, tmp_path: Pat
         run.target(maps, R, f"semidense.R={R:g}")
     written = names(export(run.result(), tmp_path / "out"), tmp_path / "out")
     assert [name for name in written if name.endswith(".pfm")] == [
-        *("Teddy/disparity.pfm", "Teddy/confidence.pfm"),
-        *("Teddy/semidense-R0.05.pfm", "Teddy/semidense-R0.90.pfm", "Teddy/semidense-R0.125.pfm"),
+        *("Teddy/disparity_raw.pfm", "Teddy/confidence.pfm"),
+        *("Teddy/disparity-R0.05.pfm", "Teddy/disparity-R0.90.pfm", "Teddy/disparity-R0.125.pfm"),
     ]
 
 
@@ -167,10 +168,10 @@ def test_a_sweep_over_other_settings_names_those_that_a_file_depends_on(run: Run
     assert [name for name in written if name.endswith(".pfm")] == [
         *(
             f"Teddy/{name}-channels.rank_window={window}.pfm"
-            for name in ("disparity", "confidence")
+            for name in ("disparity_raw", "confidence")
             for window in (15, 31)
         ),
-        *(f"Teddy/semidense-R0.50-channels.rank_window={window}.pfm" for window in (15, 31)),
+        *(f"Teddy/disparity-R0.50-channels.rank_window={window}.pfm" for window in (15, 31)),
     ]
 
 

@@ -156,11 +156,12 @@ def test_every_file_is_there_and_told(found: Match, saved: Path) -> None:
     about = json.loads((saved / "summary.json").read_text())
     told = {each["file"] for each in about["files"]}
     assert {path.name for path in saved.iterdir()} == told | {"summary.json"}
-    maps = ("disparity", "confidence", "depth", "right_disparity")
+    maps = ("disparity", "disparity_raw", "confidence", "depth", "right_disparity")
     assert {f"{name}.{ending}" for name in maps for ending in ("pfm", "png", "tif", "npy")} <= told
     for each in about["files"]:
         assert each["reference view"] == ("right" if each["file"].startswith("right") else "left")
     assert about["density_percent"] == 100 * found.density
+    assert np.array_equal(np.load(saved / "disparity_raw.npy"), found.raw, equal_nan=True)
     assert about["seconds"]["costvolume"] > 0
     assert about["versions"]["torch"]
 
@@ -240,11 +241,12 @@ def test_a_second_match_leaves_nothing_of_the_first(folder: Path, found: Match, 
 @pytest.mark.parametrize(
     "text", ["", "[]", "{}", '{"files": 3}', '{"files": [{}]}', "\x00", '{"files": [{"file": []}]}']
 )
-def test_a_summary_of_something_else_is_replaced(found: Match, tmp_path: Path, text: str) -> None:
+def test_a_summary_of_something_else_is_kept(found: Match, tmp_path: Path, text: str) -> None:
     (tmp_path / "summary.json").write_text(text)
-    (tmp_path / "points.ply").write_text("mine")
-    save(found, tmp_path, ["npy"])
-    assert json.loads((tmp_path / "summary.json").read_text())["pair"] == found.scene.name
+    with pytest.raises(UsageError, match="was not written by an earlier command"):
+        save(found, tmp_path, ["npy"])
+    assert [path.name for path in tmp_path.iterdir()] == ["summary.json"]
+    assert (tmp_path / "summary.json").read_text() == text
 
 
 def test_several_pairs_get_a_folder_each(folder: Path, found: Match, tmp_path: Path) -> None:

@@ -1,5 +1,8 @@
 """What OpenCV gives, in OpenCV's order of the bands."""
 
+import copy
+import pickle
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +13,7 @@ import pytest
 from semidense import pipeline
 from semidense.datasets import DatasetError, read_image
 from semidense.pipeline.pairs import opencv
+from semidense.pipeline.plan.errors import UsageError
 
 
 @pytest.fixture
@@ -19,6 +23,7 @@ def given(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
     class _Found:
         disparity = np.zeros((1, 1), np.float32)
+        confidence = np.full((1, 1), 0.5, np.float32)
 
     monkeypatch.setattr(opencv, "match", lambda *views, **_: found.extend(views) or _Found())
     return found
@@ -45,3 +50,56 @@ def test_other_bands_are_refused(tmp_path: Path, bands: int) -> None:
     view = np.zeros((4, 5, bands), np.uint8)
     with pytest.raises(DatasetError, match=f"4 x 5 x {bands}"):
         pipeline.StereoMatcher(numDisparities=2, cache=tmp_path).compute(view, view)
+
+
+@pytest.mark.parametrize("number", [64, 64.0, np.int64(64), np.uint8(64), np.float32(64)], ids=repr)
+def test_whole_numbers_of_every_kind_are_taken(number: int) -> None:
+    assert pipeline.StereoMatcher(number, number).getNumDisparities() == 64
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        pytest.param({"numDisparities": 0}, "at least 1", id="nothing to search"),
+        pytest.param({"numDisparities": 16.5}, "whole number", id="half a disparity"),
+        pytest.param({"numDisparities": float("nan")}, "whole number", id="no number"),
+        pytest.param({"minDisparity": "0"}, "whole number", id="a text"),
+        pytest.param({"numDisparties": 64}, "did you mean numDisparities", id="a typing mistake"),
+        pytest.param({"blockSize": 5}, "no counterpart", id="of another matcher"),
+        pytest.param({"preset": "papr"}, "no preset", id="an unknown preset"),
+        pytest.param({"R": 2}, "semidense.R = 2", id="R above 1"),
+        pytest.param({"R": 0.5, "density": 0.5}, "give one of them", id="two wishes"),
+        pytest.param({"settings": ["costvolume.mod=fast"]}, "did you mean", id="an unknown setting"),
+        pytest.param({"settings": {"costvolume.mode": "quick"}}, "costvolume.mode", id="an unknown value"),
+    ],
+)
+def test_a_mistake_is_told_at_construction(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(UsageError, match=words):
+        pipeline.StereoMatcher(**given)
+
+
+def test_a_consistency_check_is_named_as_in_opencv(monkeypatch: pytest.MonkeyPatch) -> None:
+    how: dict[str, Any] = {}
+
+    class _Found:
+        disparity = confidence = np.zeros((1, 1), np.float32)
+
+    monkeypatch.setattr(opencv, "match", lambda *_, **named: how.update(named) or _Found())
+    view = np.zeros((4, 5), np.uint8)
+    pipeline.StereoMatcher(disp12MaxDiff=2).compute(view, view)
+    assert (how["left_right"], how["tolerance"]) == (True, 2.0)
+    how.clear()
+    pipeline.StereoMatcher().compute(view, view)
+    assert "left_right" not in how
+
+
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda matcher: pickle.loads(pickle.dumps(matcher))])
+def test_a_matcher_is_copied_with_its_confidence(given: list[Any], again: Callable[..., Any]) -> None:
+    matcher = pipeline.StereoMatcher(-4, 16, R=0.8)
+    view = np.zeros((4, 5), np.uint8)
+    matcher.compute(view, view)
+    same = again(matcher)
+    assert (same.getMinDisparity(), same.getNumDisparities()) == (-4, 16)
+    assert same.confidence.tolist() == [[0.5]]
+    assert same.compute(view, view).shape == (1, 1)
+    assert len(given) == 4

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from semidense.cache import Change, Store
+from semidense.cache import ABSENT, Change, Store
 from semidense.pipeline.cli.console import why
 from semidense.pipeline.plan.causes import Causes
 from semidense.pipeline.plan.plan import Plan
@@ -91,3 +91,15 @@ def test_without_the_old_text_the_module_is_named(toy_run: ToyRun, toy_plan: Toy
 def test_each_ingredient_is_named_as_the_user_knows_it(store: Store, change: Change, text: str) -> None:
     made = step(RAMP, SimpleNamespace(files={"left": Path("/x/im0.png")}))
     assert Causes(store, ()).of(made, [change], {}) == (text,)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        pytest.param("fast", ABSENT, "costvolume.mode: fast -> exact", id="back to the default"),
+        pytest.param(ABSENT, "guided", "costvolume.mode: exact -> guided", id="away from it"),
+    ],
+)
+def test_a_setting_that_a_recipe_leaves_out_is_told_by_its_default(store: Store, old: str, new: str, text: str) -> None:
+    made = step(replace(RAMP, product="costvolume"), SimpleNamespace(files={}))
+    assert Causes(store, ()).of(made, [Change("params.mode", old, new)], {}) == (text,)

@@ -1,0 +1,63 @@
+"""Where settings come from: ``--mode``, ``--config``, ``$PIPELINE_CONFIG``, ``./pipeline.toml``, an exported run."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from semidense.pipeline.cli.options import chosen, config_file
+from semidense.pipeline.plan.config import Config
+from semidense.pipeline.plan.errors import UsageError
+
+
+def test_the_mode_wins_over_a_setting() -> None:
+    settings = chosen(["costvolume.mode=guided", "semidense.R=0.5"], "fast")
+    config = Config.load(None, settings)
+    assert (config.section("costvolume").mode, config.section("semidense").R) == ("fast", 0.5)
+    assert chosen(None, None) == ()
+
+
+def test_an_unknown_mode_is_one_line() -> None:
+    with pytest.raises(UsageError, match=r"costvolume\.mode = 'quick'"):
+        Config.load(None, chosen(None, "quick"))
+
+
+def test_the_nearest_source_of_settings_wins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("PIPELINE_CONFIG", raising=False)
+    assert config_file(None) is None
+    Path("pipeline.toml").touch()
+    assert config_file(None) == Path("pipeline.toml")
+    monkeypatch.setenv("PIPELINE_CONFIG", "elsewhere.toml")
+    assert config_file(None) == Path("elsewhere.toml")
+    assert config_file(Path("mine.toml")) == Path("mine.toml")
+
+
+def exported(tmp_path: Path, *settings: dict[str, dict[str, object]]) -> Path:
+    path = tmp_path / "config.json"
+    path.write_text(json.dumps({"configuration": [{"settings": each} for each in settings]}))
+    return path
+
+
+def test_an_exported_configuration_is_taken_without_what_its_scenes_brought(tmp_path: Path) -> None:
+    made = {
+        "images": {"files.left": "ab"},
+        "costvolume": {"d_min": 0, "d_max": 70, "mode": "guided", "votes": 12},
+        "matching_net": {"shipped": "cd"},
+        "semidense": {"R": 0.0},
+    }
+    config = Config.load(exported(tmp_path, made, made | {"costvolume": made["costvolume"] | {"d_max": 9}}))
+    costs = config.section("costvolume")
+    assert (costs.mode, costs.votes, costs.d_max, config.section("semidense").R) == ("guided", 12, None, 0)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"configuration": [3]}', '{"configuration": []}'])
+def test_another_json_file_is_one_line(tmp_path: Path, text: str) -> None:
+    (tmp_path / "other.json").write_text(text)
+    with pytest.raises(UsageError, match=r"configuration .*other\.json: it"):
+        Config.load(tmp_path / "other.json")
+
+
+def test_several_sets_of_settings_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="2 sets of settings that differ"):
+        Config.load(exported(tmp_path, {"semidense": {"R": 0.1}}, {"semidense": {"R": 0.2}}))

@@ -1,0 +1,145 @@
+"""A rectified pair whose cameras were turned on the spot is level again; matches of points judge it."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from semidense.datasets import open_dataset, read_image
+from semidense.datasets.errors import CalibrationError
+from semidense.datasets.formats.calibration.reading import read_cameras
+from semidense.pipeline.pairs.rectification import rectify_files
+from semidense.pipeline.plan.errors import UsageError
+
+FOCAL, SCALE = 999.421, 2
+"""Focal length of the Motorcycle pair in px, and how often its size is halved here."""
+TURNED = (np.array([0.01, -0.02, 0.015]), np.array([-0.012, 0.018, -0.01]))
+"""Rotation vectors of the two cameras, rad: some 20 px at their focal length."""
+BASELINE = 193.001
+
+
+def plain(size: tuple[int, int]) -> np.ndarray:
+    return np.array([[FOCAL / SCALE, 0, size[1] / 2], [0, FOCAL / SCALE, size[0] / 2], [0, 0, 1]])
+
+
+def turned(view: np.ndarray, camera: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Return what a camera sees that is turned on the spot: an homography, K R K^-1."""
+    rows, columns = view.shape[:2]
+    homography = camera @ rotation @ np.linalg.inv(camera)
+    return cv2.warpPerspective(view, homography, (columns, rows), flags=cv2.INTER_CUBIC)
+
+
+@pytest.fixture(scope="module")
+def taken(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The Motorcycle pair as two turned cameras would take it, and what cv2.stereoCalibrate would say of them."""
+    folder = tmp_path_factory.mktemp("taken")
+    views = [view[::SCALE, ::SCALE] for view in open_dataset("motorcycle").scenes[0].load_images()]
+    camera = plain(views[0].shape[:2])
+    rotations = [cv2.Rodrigues(each)[0] for each in TURNED]
+    for name, view, rotation in zip(("left", "right"), views, rotations, strict=True):
+        Image.fromarray(turned(view, camera, rotation)).save(folder / f"{name}.png")
+        Image.fromarray(view).save(folder / f"level-{name}.png")
+    write(folder / "stereo.yml", values(camera, rotations))
+    return folder
+
+
+def values(camera: np.ndarray, rotations: list[np.ndarray]) -> dict[str, np.ndarray]:
+    """Return X_right = R X_left + T of cameras that stand level, BASELINE apart, and are turned on the spot."""
+    first, second = rotations
+    place = second @ np.array([[-BASELINE], [0], [0]])
+    none = np.zeros((1, 5))
+    return {"M1": camera, "D1": none, "M2": camera, "D2": none, "R": second @ first.T, "T": place}
+
+
+def write(path: Path, matrices: dict[str, np.ndarray]) -> None:
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    for name, matrix in matrices.items():
+        storage.write(name, matrix)
+    storage.release()
+
+
+def offsets(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return how far below the left view's point the right one's lies, px, of distinctive matches."""
+    found = cv2.SIFT_create(2000)
+    (points, first), (others, second) = (
+        found.detectAndCompute(cv2.cvtColor(each, cv2.COLOR_RGB2GRAY), None) for each in (left, right)
+    )
+    pairs = [a for a, b in cv2.BFMatcher().knnMatch(first, second, k=2) if a.distance < 0.6 * b.distance]
+    return np.array([others[each.trainIdx].pt[1] - points[each.queryIdx].pt[1] for each in pairs])
+
+
+def test_a_real_pair_of_turned_cameras_is_level_again(taken: Path, tmp_path: Path) -> None:
+    rectify_files(taken / "left.png", taken / "right.png", [taken / "stereo.yml"], tmp_path / "out", "mm")
+    before = offsets(read_image(taken / "left.png"), read_image(taken / "right.png"))
+    after = offsets(read_image(tmp_path / "out" / "left.png"), read_image(tmp_path / "out" / "right.png"))
+    assert np.median(np.abs(before)) > 5
+    assert len(after) > 100
+    assert np.median(np.abs(after)) < 0.3
+    assert np.mean(np.abs(after) < 1) > 0.9
+
+
+def test_what_is_written_is_read_by_match(taken: Path, tmp_path: Path) -> None:
+    files = rectify_files(taken / "left.png", taken / "right.png", [taken / "stereo.yml"], tmp_path / "out", "mm")
+    known = read_cameras([files[2]]).calibration
+    assert known.baseline == pytest.approx(BASELINE, rel=1e-6), "turning a camera on the spot moves it nowhere"
+
+
+def test_projections_of_an_earlier_rectification_are_taken(taken: Path, tmp_path: Path) -> None:
+    """R1, R2, P1 and P2 that undo the turns exactly give the level views back, but for resampling and the edges."""
+    level = [read_image(taken / f"level-{side}.png") for side in ("left", "right")]
+    camera = plain(level[0].shape[:2])
+    first, second = (cv2.Rodrigues(each)[0] for each in TURNED)
+    none = np.zeros((1, 5))
+    write(tmp_path / "intrinsics.yml", {"M1": camera, "D1": none, "M2": camera, "D2": none})
+    moved = np.column_stack([camera, [-FOCAL / SCALE * BASELINE, 0, 0]])
+    left = np.column_stack([camera, np.zeros(3)])
+    write(tmp_path / "extrinsics.yml", {"R1": first.T, "R2": second.T, "P1": left, "P2": moved})
+    calibration = [tmp_path / "intrinsics.yml", tmp_path / "extrinsics.yml"]
+    rectify_files(taken / "left.png", taken / "right.png", calibration, tmp_path / "out")
+    for side, expected in zip(("left", "right"), level, strict=True):
+        inner = np.s_[40:-40, 40:-40]
+        found = read_image(tmp_path / "out" / f"{side}.png")[inner].astype(int)
+        assert np.median(np.abs(found - expected[inner])) <= 3
+
+
+@pytest.mark.parametrize(("depth", "shape"), [(np.uint8, (30, 40)), (np.uint8, (30, 40, 3)), (np.uint16, (30, 40))])
+def test_an_identity_keeps_every_value(tmp_path: Path, depth: type, shape: tuple[int, ...]) -> None:
+    camera = np.array([[50.0, 0, 20], [0, 50, 15], [0, 0, 1]])
+    right = np.column_stack([camera, [-50.0, 0, 0]])
+    same = {"M1": camera, "M2": camera, "R1": np.eye(3), "R2": np.eye(3), "P2": right}
+    write(tmp_path / "c.xml", same | {"P1": np.column_stack([camera, np.zeros(3)])})
+    view = np.random.default_rng(0).integers(0, np.iinfo(depth).max, shape, depth)
+    for name in ("a.png", "b.png"):
+        cv2.imwrite(str(tmp_path / name), view)
+    rectify_files(tmp_path / "a.png", tmp_path / "b.png", [tmp_path / "c.xml"], tmp_path / "out")
+    assert np.array_equal(cv2.imread(str(tmp_path / "out" / "left.png"), cv2.IMREAD_UNCHANGED), view)
+
+
+@pytest.mark.parametrize(
+    ("missing", "words"),
+    [("M1", "no M1"), ("R", "neither R and T nor"), ("T", "neither R and T nor")],
+)
+def test_a_missing_matrix_is_named(taken: Path, tmp_path: Path, missing: str, words: str) -> None:
+    rows, columns = read_image(taken / "left.png").shape[:2]
+    given = values(plain((rows, columns)), [np.eye(3), np.eye(3)])
+    path = tmp_path / "c.json"
+    path.write_text(json.dumps({name: value.tolist() for name, value in given.items() if name != missing}))
+    with pytest.raises(CalibrationError, match=words):
+        rectify_files(taken / "left.png", taken / "right.png", [path], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_calibration_of_another_size_is_refused(taken: Path, tmp_path: Path) -> None:
+    given = values(plain((480, 640)), [np.eye(3), np.eye(3)])
+    told = {name: value.tolist() for name, value in given.items()} | {"image_width": 640, "image_height": 480}
+    (tmp_path / "c.json").write_text(json.dumps(told))
+    with pytest.raises(CalibrationError, match="480 x 640 pixels"):
+        rectify_files(taken / "left.png", taken / "right.png", [tmp_path / "c.json"], tmp_path / "out")
+
+
+def test_the_views_are_not_overwritten(taken: Path) -> None:
+    with pytest.raises(UsageError, match="reads this file"):
+        rectify_files(taken / "left.png", taken / "right.png", [taken / "stereo.yml"], taken)
