@@ -9,7 +9,7 @@ from semidense.datasets.formats.calibration.cameras import MILLIMETRES, Cameras,
 from semidense.datasets.formats.calibration.intrinsics import intrinsics_cameras, numbers_only
 from semidense.datasets.formats.calibration.key_values import key_value_cameras
 from semidense.datasets.formats.calibration.kitti import is_kitti, kitti_cameras
-from semidense.datasets.formats.calibration.markup import markup_values
+from semidense.datasets.formats.calibration.markup import markup_values, yaml_values
 from semidense.datasets.formats.calibration.matrices import matrices_cameras
 from semidense.datasets.formats.calibration.middlebury import middlebury_cameras
 from semidense.datasets.formats.calibration.ros import ros_cameras
