@@ -114,7 +114,7 @@ def test_the_report_shows_what_is_cached_and_says_the_same(found: Comparison, ta
         if row["experiment"] == "auc":
             assert row["method"] in page and f'<td class="number">{row["auc"]:.4f}</td>' in page
         if row["experiment"] == "density" and "R" not in row:
-            assert f'<td class="number">{row["invalid"]:.1f}</td>' in page, "the table"
+            assert f'<td class="number">{row["invalid"]:.2f}</td>' in page, "the table"
             assert ("bad" in row) == (f">{row['method']}</text>" in page), "the curve's legend"
 
 

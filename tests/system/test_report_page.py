@@ -102,4 +102,4 @@ def test_the_curve_is_the_sweep_s(look: Callable[..., Seen], address: str, own_t
     told = page.evaluate(f"[...document.querySelectorAll('details tr')].map((row) => {cells})")
     for row in rows:
         if "bad" in row:  # else nothing is kept, and the curve has no point
-            assert f"{row['R']:g} {row['invalid']:.1f} {row['bad']:.2f}" in told
+            assert f"{row['R']:g} {row['invalid']:.2f} {row['bad']:.2f}" in told
