@@ -32,6 +32,8 @@ def run_on_cluster(graph: Callable[[], Sequence[Any]], lease: Lease, watch: Watc
         UsageError: if the scheduler or all workers are lost, or one task after another kills its worker.
         StageRefused, StageFailed: as a stage does.
     """
+    import distributed  # noqa: F401 - which sets up its loggers
+
     with _quietly(), _explained(address), _connected(address) as client:
         futures = client.compute(list(graph()))
         try:
@@ -45,13 +47,15 @@ def run_on_cluster(graph: Callable[[], Sequence[Any]], lease: Lease, watch: Watc
 @contextmanager
 def _quietly() -> Iterator[None]:
     """Keep Dask's own words about lost connections from the terminal: one line of ours says it."""
-    logger = logging.getLogger("distributed")
-    level = logger.level
-    logger.setLevel(logging.CRITICAL + 1)
+    handlers = {each for name in ("distributed", "distributed.client") for each in logging.getLogger(name).handlers}
+    levels = {each: each.level for each in handlers}  # each of Dask's loggers has a level of its own
+    for each in handlers:
+        each.setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        logger.setLevel(level)
+        for each, level in levels.items():
+            each.setLevel(level)
 
 
 @contextmanager

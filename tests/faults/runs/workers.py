@@ -71,7 +71,7 @@ def _edited_installation(folder: Path, path: str) -> Iterator[Path]:
 
 def _worker(address: str, names: Path, log: Path) -> "subprocess.Popen[bytes]":
     command = ["-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
-    environment = {**os.environ, "PYTHONPATH": str(names)}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(names), str(PROJECT)])}
     with log.open("wb") as file:
         return subprocess.Popen(
             [sys.executable, *command], env=environment, cwd=names, stdout=file, stderr=subprocess.STDOUT
@@ -174,9 +174,18 @@ def _killed_schedulers(tally: Tally, trials: int) -> None:
     for number in range(trials):
         with world.folder() as root, _outside(root.parent) as (address, scheduler):
             store, graph = Store(root), slow.scenes(SCENES)
-            threading.Timer(1.0 + 0.5 * number, scheduler.kill).start()
+            threading.Thread(target=_kill_at_work, args=(store, scheduler, 0.3 * number), daemon=True).start()
             tally.injected += 1
             _refused(tally, store, graph, address, "does not answer", f"scheduler killed, {number}")
+
+
+def _kill_at_work(store: Store, scheduler: "subprocess.Popen[bytes]", after: float) -> None:
+    """Kill the scheduler some time after the first draft was begun."""
+    deadline = time.monotonic() + world.HANGS
+    while not store.layout.things(store.layout.drafts) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    time.sleep(after)
+    scheduler.kill()
 
 
 @contextmanager
