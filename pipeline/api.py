@@ -16,9 +16,8 @@ from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.execution.watch import Unwatched, Watch
 from semidense.pipeline.plan.config import Config, Settings, alternatives, setting_texts, shortened, value_text
 from semidense.pipeline.plan.errors import UsageError
-from semidense.pipeline.plan.plan import Made, Plan, Planned, make_plan
+from semidense.pipeline.plan.plan import Made, Plan, Planned, close_ranges, make_plan
 from semidense.pipeline.plan.presets import DEFAULT
-from semidense.pipeline.plan.ranges import close_ranges
 from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.plan.training_split import training_scenes
 from semidense.pipeline.results.metric_rows import METHOD

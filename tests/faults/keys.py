@@ -13,8 +13,9 @@ from annotated_types import Ge, Gt, Le, Lt
 
 from semidense.cache.keys.code import source_hash
 from semidense.datasets.scene import DisparityRange, SceneSource
+from semidense.pipeline.plan.building import build
 from semidense.pipeline.plan.config import CHOICES, Config
-from semidense.pipeline.plan.steps import Graph, Request, build, products
+from semidense.pipeline.plan.steps import Graph, Request, products
 from semidense.stages.catalog import STAGES
 from semidense.stages.compute.precision import resolve
 from tests.faults.tally import Tally

@@ -7,8 +7,7 @@ from semidense.cache import Entry, Recipe, Store
 from semidense.pipeline.comparison.experiments import MATCHERS, MEASURES, matcher_rows, measure_rows
 from semidense.pipeline.comparison.rows import Judged, Row
 from semidense.pipeline.plan.environment import missing_packages
-from semidense.pipeline.plan.plan import Planned, make_plan
-from semidense.pipeline.plan.ranges import close_ranges
+from semidense.pipeline.plan.plan import Planned, close_ranges, make_plan
 from semidense.pipeline.plan.steps import SPLIT, Request, Step
 from semidense.stages.catalog import STAGES
 

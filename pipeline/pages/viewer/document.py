@@ -53,7 +53,7 @@ def build(document: Document, store: Store) -> Session:
     document.js_on_event(DocumentReady, *session.first)
     document.title = "Cache viewer"
     document.template = get_env().from_string(
-        (files("semidense.pipeline.pages.viewer") / "page.html").read_text(encoding="utf-8")
+        (files("semidense.pipeline.pages.viewer") / "page" / "page.html").read_text(encoding="utf-8")
     )
     return session
 

@@ -29,7 +29,7 @@ _FIGURES = ("R", "invalid", "bad", "avgerr", "rms")
 
 def script(name: str) -> str:
     """Return the code of a callback that runs in the browser."""
-    return (files("semidense.pipeline.pages.viewer") / f"{name}.js").read_text(encoding="utf-8")
+    return (files("semidense.pipeline.pages.viewer") / "page" / f"{name}.js").read_text(encoding="utf-8")
 
 
 class Sources:

@@ -1,7 +1,7 @@
 import pytest
 
+from semidense.pipeline.plan.building import resolved
 from semidense.pipeline.plan.config import Config
-from semidense.pipeline.plan.resolution import resolved
 from semidense.stages.compute import precision
 
 TRAINED = ("matching_net", "descriptor_net")

@@ -8,9 +8,10 @@ import pytest
 
 from semidense.datasets import Dataset, SceneSource, open_dataset
 from semidense.pipeline.plan import shipped_weights as shipped
+from semidense.pipeline.plan.building import build
 from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.errors import UsageError
-from semidense.pipeline.plan.steps import SPLIT, Graph, Request, Step, build, products
+from semidense.pipeline.plan.steps import SPLIT, Graph, Request, Step, products
 from semidense.pipeline.plan.training_split import training_scenes
 from semidense.stages.catalog import CATALOG, READ
 from semidense.stages.stage import StageError

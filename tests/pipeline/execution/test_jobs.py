@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from semidense.cache import DamagedEntry, Recipe, Store
-from semidense.pipeline.execution import recent_inputs as recent
-from semidense.pipeline.execution.recent_inputs import Recent
+from semidense.pipeline.execution import jobs as recent
+from semidense.pipeline.execution.jobs import Recent
 
 
 def publish(store: Store, value: float, size: int = 4) -> str:

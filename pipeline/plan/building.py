@@ -1,0 +1,271 @@
+"""Build the steps of a request: what each product is made from, and with which settings.
+
+Several configurations share the steps in which they agree, so a sweep computes nothing twice. Nothing here looks at a
+cache.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from semidense.datasets import SceneSource
+from semidense.pipeline.plan.config import Config, nearest, one_line
+from semidense.pipeline.plan.environment import environment
+from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.images_and_truth import SOURCES, Source
+from semidense.pipeline.plan.shipped_weights import Weights, own_weights, shipped_weights, weights_stage
+from semidense.pipeline.plan.steps import (
+    SPLIT,
+    Argument,
+    Graph,
+    Request,
+    Step,
+    code_of,
+    made_from,
+    needs_range,
+    place,
+    products,
+    scope_of,
+)
+from semidense.pipeline.plan.training_split import outside, with_folds
+from semidense.stages.catalog import READ, STAGES
+from semidense.stages.compute.precision import resolve
+from semidense.stages.evaluation.calibration.declaration import CalibrationParams
+from semidense.stages.evaluation.filtering import SemidenseParams
+from semidense.stages.matching.declaration import CostVolumeParams
+from semidense.stages.stage import Params, Stage
+from semidense.stages.transforms.declaration import ChannelsParams
+
+
+def build(request: Request) -> Graph:
+    """Return the steps that a request needs.
+
+    Raises:
+        UsageError: if there is nothing to do, or settings do not go together.
+        StageError: if shipped weights are needed and there are none.
+    """
+    doubts = (f"{scene.name}: {warning}" for scene in request.dataset.scenes for warning in scene.warnings)
+    graph = Graph(notes=[*request.notes, *doubts])
+    trained_on = [scene.image_identity() for scene in request.training if request.leave_out]
+    for variant, config in request.configs.items():
+        builder = _Builder(graph, config, request)
+        graph.targets += [(step_id, variant) for step_id in _targets(builder, trained_on)]
+    graph.steps = dict(sorted(graph.steps.items(), key=lambda item: place(item[1].product)))
+    graph.notes = list(dict.fromkeys(graph.notes))
+    if not graph.targets:
+        raise UsageError(f"{request.dataset.spec}: no scene is left to work on; {'; '.join(graph.notes)}")
+    return graph
+
+
+def _targets(builder: "_Builder", trained_on: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Add what one configuration asks for, but for the pairs that are trained on; yield the ids of its last steps."""
+    upto, notes = builder.request.upto, builder.graph.notes
+    if upto in STAGES and STAGES[upto].scope == "split":
+        yield builder.product(upto, None)
+        return
+    for scene in builder.request.dataset.scenes:
+        if trained_on and scene.image_identity() in trained_on:
+            notes.append(f"{scene.name} is a training scene: it is left out, since nothing is tested on it")
+        elif not scene.has_truth and "truth" in made_from(upto):
+            notes.append(f"{scene.name} has no ground truth: no {upto} can be made for it")
+            yield builder.product(_known(scene, _without_truth(upto), notes), scene)
+        else:
+            yield from (builder.product(_known(scene, each, notes), scene) for each in (upto, *builder.request.also))
+
+
+def _without_truth(product: str) -> str:
+    """Return the last product on the way to one that needs a truth which can be made without it."""
+    ways = [each for each in products() if each in made_from(product) and "truth" not in made_from(each)]
+    return ways[-1] if ways else READ[0]
+
+
+def _known(scene: SceneSource, product: str, notes: list[str]) -> str:
+    """Return the product, or the one to stop at while the scene's range is open."""
+    if not (scene.open_ends and needs_range(product)):
+        return product
+    notes.append(f"{scene.name}: the range of disparities is estimated first; a run shows what comes after `survey`")
+    return "survey"
+
+
+@dataclass
+class _Builder:
+    """Adds the steps of one configuration to a graph.
+
+    Attributes:
+        graph: what the steps are added to.
+        config: of these steps.
+        request: what they are for.
+        known: ids of the steps that it added, by product and scene.
+    """
+
+    graph: Graph
+    config: Config
+    request: Request
+    known: dict[tuple[str, int], str] = field(default_factory=dict)
+
+    def product(self, product: str, scene: SceneSource | None) -> str:
+        """Add the step of a product, and before it those it is made from; return its id."""
+        scene = None if scope_of(product) == "split" else scene
+        asked = product, id(scene)
+        if asked not in self.known:
+            self.known[asked] = self._add_product(product, scene)
+        return self.known[asked]
+
+    def _add_product(self, product: str, scene: SceneSource | None) -> str:
+        if product in SOURCES and scene:
+            return self._add_source(SOURCES[product], scene)
+        if product not in STAGES:
+            raise UsageError(f"{product} is read from a scene: name a dataset")
+        if STAGES[product].learnt and (weights := self._weights(product)):
+            return self._add(weights_stage(product), None, weights, {"shipped": weights.digest}, {})
+        if STAGES[product].cross_fitted:
+            return self._add_cross_fitted(product)
+        stage, params = self._chosen(product)
+        if "channels" in stage.inputs:
+            require_trainable(self.config, product)
+        needed = getattr(params, "inputs", stage.inputs)
+        inputs = {name: self._inputs(stage, name, scene) for name in stage.inputs if name in needed}
+        return self._add_stage(stage, params, scene, inputs)
+
+    def _weights(self, product: str) -> Weights | None:
+        """Return the file that stands in for learning a product; None if it is learnt."""
+        if file := self.config.choice("weights", product):
+            return own_weights(product, Path(file).expanduser())
+        if self.request.train and product not in self.config.training.shipped:
+            return None
+        mode = self.config.of("costvolume", CostVolumeParams).mode
+        return shipped_weights(product, mode, self.config.choice("use", "confidence"))
+
+    def _chosen(self, product: str) -> tuple[Stage, Params]:
+        """Return the stage that makes a product, and its settings: its own, or the one that ``use`` names.
+
+        Raises:
+            UsageError: if that one makes something else, or is made from the product itself.
+        """
+        other = self.config.choice("use", product) or product
+        if other not in STAGES:
+            raise UsageError(f"use.{product} = {other!r}: no product {other!r}; {nearest(other, STAGES)}")
+        stage, own = STAGES[other], STAGES[product]
+        arrays = {output.name: output.dims for output in stage.outputs}
+        missing = [output.name for output in own.outputs if arrays.get(output.name) != output.dims]
+        if missing or stage.scope != own.scope or (other != product and product in made_from(other)):
+            why = f"it has no array {missing[0]!r} with its dimensions" if missing else f"it is made from {product}"
+            raise UsageError(f"use.{product} = {other!r}: {other} cannot take the place of {product}, {why}")
+        return replace(stage, product=product), self.config.section(stage.section or other)
+
+    def _inputs(self, stage: Stage, product: str, scene: SceneSource | None) -> tuple[str, ...]:
+        if stage.scope == "split" and scope_of(product) == "scene":
+            return tuple(self.product(product, source) for source in self.request.training)
+        return (self.product(product, scene),)
+
+    def _add_cross_fitted(self, product: str) -> str:
+        """Add a product of all training scenes, each scored by networks that learnt from other folds."""
+        scenes = self.request.training
+        config = with_folds(self.config, [scene.name for scene in scenes])
+        params = config.of(product, CalibrationParams)
+        folds = params.fold_of_scene or ()
+        requests = {fold: replace(self.request, training=outside(scenes, folds, fold)) for fold in set(folds)}
+        builders = {fold: replace(self, config=config, request=requests[fold], known={}) for fold in requests}
+        stage = STAGES[product]
+        inputs = {
+            name: tuple(builders[fold].product(name, scene) for scene, fold in zip(scenes, folds, strict=True))
+            for name in stage.inputs
+        }
+        return replace(self, config=config)._add_stage(stage, params, None, inputs)
+
+    def _add_source(self, source: Source, scene: SceneSource) -> str:
+        identity = source.identity(scene)
+        known = replace(scene, digests=identity["files"])  # what is read must be what the key names
+        return self._add(source.stage, scene, known, identity, {}, scene.reader)
+
+    def _add_stage(
+        self, stage: Stage, params: Params, scene: SceneSource | None, inputs: Mapping[str, tuple[str, ...]]
+    ) -> str:
+        params = resolved(params, scene)
+        settings = params.model_dump(mode="json") | {"tiles": stage.tiling(params)}
+        return self._add(stage, scene, params, settings, inputs)
+
+    @cached_property
+    def _settings(self) -> dict[str, Any]:
+        return self.config.to_dict()
+
+    def _configuration(self, product: str, argument: object) -> dict[str, Any]:
+        """Return all settings, a step's own as they were resolved for it."""
+        own = {product: argument.model_dump(mode="json")} if isinstance(argument, Params) else {}
+        return {**self._settings, **(own if product in self._settings else {})}
+
+    def _add(
+        self,
+        stage: Stage,
+        scene: SceneSource | None,
+        argument: Argument,
+        settings: Mapping[str, Any],
+        inputs: Mapping[str, tuple[str, ...]],
+        *modules: str,
+    ) -> str:
+        name, dataset, size = (scene.name, scene.dataset, scene.size) if scene else (SPLIT, SPLIT, None)
+        identity = json.dumps([stage.product, name, dataset, size, settings, inputs], sort_keys=True)
+        step_id = hashlib.sha256(identity.encode()).hexdigest()[:16]
+        if step_id not in self.graph.steps:
+            semidense = self.config.of("semidense", SemidenseParams)
+            filtered = semidense.by_R and "semidense" in (stage.product, *stage.inputs)
+            self.graph.steps[step_id] = Step(
+                id=step_id,
+                stage=stage,
+                scene=name,
+                dataset=dataset,
+                argument=argument,
+                settings=dict(settings),
+                inputs=dict(inputs),
+                size=size,
+                code=code_of(stage.module, *modules),
+                environment=environment(stage),
+                R=semidense.R if filtered else None,
+                configuration=self._configuration(stage.product, argument),
+            )
+        return step_id
+
+
+def resolved(params: Params, scene: SceneSource | None) -> Params:
+    """Return the settings with what was left open filled in: the scene's range, this CPU's precision."""
+    update: dict[str, Any] = {}
+    if scene:
+        _require_within(params, scene)
+    if hasattr(params, "precision"):
+        update["precision"] = resolve(params.precision, transformed=getattr(params, "transformed", False))
+    if scene and getattr(params, "d_min", 0) is None:
+        update["d_min"] = max(scene.disparities.minimum, 1 - scene.size[1])
+    if scene and getattr(params, "d_max", 0) is None:
+        update["d_max"] = min(scene.disparities.maximum, scene.size[1] - 1)  # a file may claim any number
+    try:
+        return type(params).model_validate(dict(params) | update)
+    except ValidationError as error:
+        raise UsageError(f"{scene.name if scene else 'training split'}: {one_line(error)}") from None
+
+
+def _require_within(params: Params, scene: SceneSource) -> None:
+    """Refuse a range that no pixel of the image can have: it would only fill memory and disk."""
+    width = scene.size[1]
+    for name in ("d_min", "d_max"):
+        value = getattr(params, name, None)
+        if value is not None and abs(value) >= width:
+            raise UsageError(f"{scene.name}: {name} is {value} px, but the image is only {width} px wide")
+
+
+def require_trainable(config: Config, product: str) -> None:
+    """Refuse to train with another light on the gray channel where there is none: it would fall on another channel.
+
+    Raises:
+        UsageError: if the product's ``relight`` is on and ``channels.use`` leaves gray out.
+    """
+    if getattr(config.section(product), "relight", 0) and "gray" not in config.of("channels", ChannelsParams).use:
+        raise UsageError(
+            f"{product}.relight changes the light of the gray channel, which channels.use leaves out: "
+            f"set {product}.relight=0"
+        )
