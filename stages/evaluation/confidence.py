@@ -8,12 +8,12 @@ from semidense.stages.compute.allocator import keep_freed_memory
 from semidense.stages.compute.precision import Precision, autocast
 from semidense.stages.compute.threads import one_thread
 from semidense.stages.evaluation.agreement import padded_agreement
-from semidense.stages.evaluation.declaration import RADIUS, ConfidenceParams
+from semidense.stages.evaluation.declaration import RADIUS, Confidence, ConfidenceParams, Judged
 from semidense.stages.evaluation.layers import evaluation_layers
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.evaluation.silence.veto import vetoed
 from semidense.stages.learning.parameters import from_vector
-from semidense.stages.stage import Array, Inputs, require_shape
+from semidense.stages.stage import require_shape
 
 
 def confidence(
@@ -74,11 +74,11 @@ def weigh_in(
     return sigmoid((log_odds + np.float32(weight) * np.log(agreement / np.float32(typical))).astype(np.float32))
 
 
-def compute_confidence(params: ConfidenceParams, inputs: Inputs) -> dict[str, NDArray[np.float32]]:
+def compute_confidence(params: ConfidenceParams, inputs: Judged) -> Confidence:
     """Return one tile of the confidence map, from a block with its halo."""
     net = EvaluationNet()
     from_vector(net, inputs["evaluation_net"]["parameters"])
-    images: dict[str, Array] = inputs["images"]
+    images = inputs["images"]
     disparity = inputs["disparity"]["disparity"]
     layers = evaluation_layers(images["left"], images["moments"][0], disparity)
     net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from semidense.stages.compute.precision import Precision
+from semidense.stages.evaluation.silence.declaration import Vetoing
 from semidense.stages.learning.schedule import SHARDS, Schedule
-from semidense.stages.stage import DisparityMap, Images, Output, Params, Stage, Truth
+from semidense.stages.stage import DisparityMap, Images, Network, Output, Params, Stage, Truth
 from semidense.stages.transforms.window import require_window
 
 PATCH = 101
@@ -150,6 +151,13 @@ EVALUATION_NET = Stage(
     monitored=True,
     learnt=True,
 )
+
+
+class Judged(Vetoing):
+    """What a confidence is made from."""
+
+    images: Images
+    evaluation_net: Network
 
 
 class Confidence(TypedDict):

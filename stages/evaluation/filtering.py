@@ -1,13 +1,15 @@
 """The semi-dense map: only disparities that the evaluation network trusts."""
 
 import math
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from semidense.stages.stage import Arrays, Inputs, Output, Params, Stage, StageError, require_share
+from semidense.stages.evaluation.calibration.declaration import Calibrated
+from semidense.stages.evaluation.declaration import Confidence
+from semidense.stages.stage import DisparityMap, Output, Params, Stage, StageError, require_share
 
 
 class SemidenseParams(Params):
@@ -119,10 +121,26 @@ def threshold_for_error(max_error: float, disparity: NDArray[Any], probability: 
     return float(values[::-1][reached[-1]]) if reached.size else 1.0
 
 
-def compute_semidense(params: SemidenseParams, inputs: Inputs) -> Arrays:
+class Scored(TypedDict):
+    """What is filtered, and by what."""
+
+    disparity: DisparityMap
+    confidence: Confidence
+    calibrated_confidence: Calibrated
+
+
+class Semidense(TypedDict):
+    """The product ``semidense``: (y, x) disparities in px, NaN: confidence below R; (1,) R."""
+
+    disparity: NDArray[np.float32]
+    R: NDArray[np.float64]
+
+
+def compute_semidense(params: SemidenseParams, inputs: Scored) -> Semidense:
     """Compute the product ``semidense``; see ``keep_confident``, ``threshold_for`` and ``threshold_for_error``."""
     disparity = inputs["disparity"]["disparity"]
-    confidence = inputs["calibrated_confidence" if params.calibrated else "confidence"]["confidence"]
+    judged = inputs["calibrated_confidence"] if params.calibrated else inputs["confidence"]
+    confidence = judged["confidence"]
     R = params.R
     if params.density is not None:
         R = threshold_for(params.density, disparity, confidence)

@@ -6,17 +6,17 @@ from numpy.typing import NDArray
 
 from semidense.stages.compute.threads import one_thread
 from semidense.stages.evaluation.confidence import sigmoid
-from semidense.stages.evaluation.evidence.declaration import EvidenceConfidenceParams
+from semidense.stages.evaluation.declaration import Confidence
+from semidense.stages.evaluation.evidence.declaration import EvidenceConfidenceParams, WithEvidence
 from semidense.stages.evaluation.evidence.features import features
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.silence.veto import vetoed
 from semidense.stages.learning.parameters import from_vector
-from semidense.stages.stage import Arrays, Inputs
 
 
+@one_thread()
 def weigh(parameters: NDArray[np.float32], stacked: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the log-odds (y, x) that each disparity is right, of features (feature, y, x)."""
-    one_thread()
     net = EvidenceNet()
     from_vector(net, parameters)
     with torch.inference_mode():
@@ -25,7 +25,7 @@ def weigh(parameters: NDArray[np.float32], stacked: NDArray[np.float32]) -> NDAr
     return odds.reshape(stacked.shape[1:])
 
 
-def compute_evidence_confidence(params: EvidenceConfidenceParams, inputs: Inputs) -> Arrays:
+def compute_evidence_confidence(params: EvidenceConfidenceParams, inputs: WithEvidence) -> Confidence:
     """Return one tile of the confidence map, from a block with its halo.
 
     Raises:

@@ -1,13 +1,14 @@
 """Declare the net that weighs the evidence, and the confidence that it gives. Light: it does not load torch."""
 
-from typing import Literal
+from collections.abc import Sequence
+from typing import Literal, TypedDict
 
 from pydantic import Field
 
 from semidense.stages.compute.precision import Precision
-from semidense.stages.evaluation.declaration import RADIUS
+from semidense.stages.evaluation.declaration import RADIUS, Judged
 from semidense.stages.learning.schedule import SHARDS, Schedule
-from semidense.stages.stage import Output, Params, Stage
+from semidense.stages.stage import DisparityMap, Images, Network, Output, Params, Stage, Truth
 
 WINDOWS = (25, 9)
 """Sides of the windows in which neighbours are counted, px."""
@@ -42,6 +43,21 @@ class EvidenceConfidenceParams(Params):
         """The products that these settings need."""
         vetoing = ("distinctiveness", "cost_margin") if self.veto else ()
         return ("images", "disparity", "evaluation_net", "evidence_net", *vetoing)
+
+
+class EvidentScenes(TypedDict):
+    """What the net that weighs the evidence learns from: every training scene, and the evaluation-Net."""
+
+    images: Sequence[Images]
+    disparity: Sequence[DisparityMap]
+    truth: Sequence[Truth]
+    evaluation_net: Network
+
+
+class WithEvidence(Judged):
+    """What a confidence is made from, and what weighs it."""
+
+    evidence_net: Network
 
 
 EVIDENCE_NET = Stage(

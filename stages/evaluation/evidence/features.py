@@ -1,6 +1,8 @@
 """What is known of each pixel of a map: what the costs say, what the evaluation-Net says, and the pixels around."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -15,7 +17,7 @@ from semidense.stages.evaluation.evidence.declaration import WINDOWS
 from semidense.stages.evaluation.layers import evaluation_layers
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.parameters import from_vector
-from semidense.stages.stage import Arrays, StageError
+from semidense.stages.stage import Images, Network, StageError
 
 _AGREES = FEATURES.index("agrees")
 
@@ -35,7 +37,7 @@ class Features:
     stacked: NDArray[np.float32]
 
 
-def features(images: Arrays, disparity: Arrays, evaluation_net: Arrays, precision: Precision) -> Features:
+def features(images: Images, disparity: Mapping[str, Any], evaluation_net: Network, precision: Precision) -> Features:
     """Return the features of a map, of arrays with 50 px of context all round.
 
     Args:
@@ -58,16 +60,19 @@ def features(images: Arrays, disparity: Arrays, evaluation_net: Arrays, precisio
     return Features(log_odds, agreements[0], np.sign(stacked) * np.log1p(np.abs(stacked)))
 
 
-def of_whole_map(images: Arrays, disparity: Arrays, evaluation_net: Arrays, precision: Precision) -> Features:
+def of_whole_map(
+    images: Images, disparity: Mapping[str, Any], evaluation_net: Network, precision: Precision
+) -> Features:
     """As ``features``, of arrays without context: beyond the image lies the nearest pixel, as in a tile."""
-    margins = {"left": ((RADIUS, RADIUS), (RADIUS, RADIUS), (0, 0)), "evidence": ((0, 0), *[(RADIUS, RADIUS)] * 2)}
-    views = {"left": np.pad(images["left"], margins["left"], mode="edge"), "moments": images["moments"]}
-    padded = {name: np.pad(array, margins.get(name, RADIUS), mode="edge") for name, array in disparity.items()}
+    around = (RADIUS, RADIUS)
+    views: Images = {**images, "left": np.pad(images["left"], (around, around, (0, 0)), mode="edge")}
+    margins = {"disparity": (around, around), "evidence": ((0, 0), around, around)}
+    padded = {name: np.pad(array, margins[name], mode="edge") for name, array in disparity.items()}
     return features(views, padded, evaluation_net, precision)
 
 
 def _log_odds(
-    images: Arrays, disparity: NDArray[np.float32], evaluation_net: Arrays, precision: Precision
+    images: Images, disparity: NDArray[np.float32], evaluation_net: Network, precision: Precision
 ) -> NDArray[np.float32]:
     net = EvaluationNet()
     from_vector(net, evaluation_net["parameters"])

@@ -6,21 +6,19 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from semidense.stages.evaluation.evidence.declaration import EvidenceNetParams
+from semidense.stages.evaluation.evidence.declaration import EvidenceNetParams, EvidentScenes
 from semidense.stages.evaluation.evidence.features import of_whole_map
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.learning.parameters import initialise, to_vector
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import fit
-from semidense.stages.stage import Arrays, Inputs, Monitor, Silent, by_scene
+from semidense.stages.stage import DisparityMap, Images, Monitor, Network, Silent, Truth, by_scene
 
 Pixels = tuple[NDArray[np.float32], NDArray[np.bool_]]
 """Features (pixel, feature), and whether each disparity is right (pixel,)."""
 
 
-def train_evidence_net(
-    params: EvidenceNetParams, inputs: Inputs, monitor: Monitor | None = None
-) -> dict[str, NDArray[np.float32]]:
+def train_evidence_net(params: EvidenceNetParams, inputs: EvidentScenes, monitor: Monitor | None = None) -> Network:
     """Train the net from nothing; its answer is the log-odds of a right disparity in the training scenes.
 
     Args:
@@ -56,7 +54,10 @@ def train_evidence_net(
 
 
 def _drawn(
-    params: EvidenceNetParams, rng: np.random.Generator, scene: tuple[Arrays, ...], evaluation_net: Arrays
+    params: EvidenceNetParams,
+    rng: np.random.Generator,
+    scene: tuple[Images, DisparityMap, Truth],
+    evaluation_net: Network,
 ) -> Pixels:
     """Draw pixels of a scene whose truth is known, hidden ones too: a map answers for those as well."""
     images, disparity, truth = scene

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.evaluation.silence.declaration import LARGEST_MARGIN
-from semidense.stages.stage import Arrays, Inputs, NoParams, require_shape
+from semidense.stages.evaluation.silence.declaration import LARGEST_MARGIN, CostMargin
+from semidense.stages.stage import NoParams, OfVolume, require_shape
 
 
 def cost_margin(costs: NDArray[Any]) -> NDArray[np.float32]:
@@ -57,6 +57,6 @@ def _difference(least: np.float32, rival: np.float32, largest: np.float32) -> np
     return np.float32(0) if rival == least else min(rival - least, largest)
 
 
-def compute_cost_margin(_: NoParams, inputs: Inputs) -> Arrays:
+def compute_cost_margin(_: NoParams, inputs: OfVolume) -> CostMargin:
     """Compute the product ``cost_margin``; see ``cost_margin``."""
     return {"margin": cost_margin(inputs["costvolume"]["cost"])}

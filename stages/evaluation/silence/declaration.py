@@ -1,8 +1,12 @@
 """Declare the two products that can veto a confidence. Light: it loads no numba."""
 
+from typing import TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from semidense.stages.stage import Output, Params, Stage, StageError
+from semidense.stages.stage import DisparityMap, Output, Params, Stage, StageError
 from semidense.stages.transforms.window import require_window
 
 NEAREST_REPETITION = 4
@@ -40,6 +44,27 @@ class DistinctivenessParams(Params):
         if self.d_min is None or self.d_max is None:
             raise StageError("distinctiveness needs a disparity range: give d_min and d_max")
         return self.d_max - self.d_min
+
+
+class Distinctiveness(TypedDict):
+    """The product ``distinctiveness``: (y, x) of each view."""
+
+    left: NDArray[np.float32]
+    right: NDArray[np.float32]
+
+
+class CostMargin(TypedDict):
+    """The product ``cost_margin``: (y, x) log-odds, NaN: no winner."""
+
+    margin: NDArray[np.float32]
+
+
+class Vetoing(TypedDict):
+    """What a veto is read off."""
+
+    disparity: DisparityMap
+    distinctiveness: Distinctiveness
+    cost_margin: CostMargin
 
 
 DISTINCTIVENESS = Stage(

@@ -8,8 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.evaluation.silence.declaration import MOST_DISTINCT, NEAREST_REPETITION, DistinctivenessParams
-from semidense.stages.stage import Arrays, Inputs
+from semidense.stages.evaluation.silence.declaration import (
+    MOST_DISTINCT,
+    NEAREST_REPETITION,
+    Distinctiveness,
+    DistinctivenessParams,
+)
+from semidense.stages.stage import OfImages
 from semidense.stages.transforms.gray import require_gray, to_gray
 
 
@@ -108,7 +113,8 @@ def _write_least(columns: NDArray[np.int32], window: int, shift: int, least: NDA
             total -= columns[first]
 
 
-def compute_distinctiveness(params: DistinctivenessParams, inputs: Inputs) -> Arrays:
+def compute_distinctiveness(params: DistinctivenessParams, inputs: OfImages) -> Distinctiveness:
     """Compute the product ``distinctiveness`` of both views; see ``distinctiveness``."""
     images = inputs["images"]
-    return {view: distinctiveness(to_gray(images[view]), params) for view in ("left", "right")}
+    left, right = (distinctiveness(to_gray(view), params) for view in (images["left"], images["right"]))
+    return {"left": left, "right": right}

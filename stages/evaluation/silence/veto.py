@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
 from semidense.stages.evaluation.declaration import RADIUS
-from semidense.stages.stage import Array, Inputs
+from semidense.stages.evaluation.silence.declaration import Vetoing
+from semidense.stages.stage import Array
 
 TIED = 0.1
 """Margin below which a rival is as good as the winner, log-odds: what rounding of the costs makes of equal ones."""
@@ -15,7 +16,7 @@ WINDOW = 9
 """Side of the window of that mean, px."""
 
 
-def vetoed(inputs: Inputs) -> NDArray[np.bool_]:
+def vetoed(inputs: Vetoing) -> NDArray[np.bool_]:
     """Return where the views or the costs tell no disparity, (y, x), of a block with 50 px of context all round.
 
     Args:
