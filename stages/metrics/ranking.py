@@ -1,11 +1,14 @@
 """The product ``ranking``: the figures of a scene before filtering, which no threshold on the confidence changes."""
 
+from typing import TypedDict
+
 import numpy as np
 from numpy.typing import NDArray
 
+from semidense.stages.evaluation.declaration import Confidence
 from semidense.stages.metrics.confidence import Ranking, optimal_auc
 from semidense.stages.metrics.errors import MASKS, THRESHOLDS, Errors, counted, pixels_of, require_equal
-from semidense.stages.stage import Array, Arrays, Inputs, NoParams, Output, Stage
+from semidense.stages.stage import Array, DisparityMap, NoParams, Output, Stage, Truth
 
 RANKED = ("pixels", "raw_bad", "auc", "auc_optimal")
 """The order of the figure axis."""
@@ -13,13 +16,27 @@ DIMS = ("figure", "mask", "threshold")
 AXES = f"of {', '.join(MASKS)}; wrong above {', '.join(f'{threshold:g}' for threshold in THRESHOLDS)} px"
 
 
-def compute_ranking(_: NoParams, inputs: Inputs) -> Arrays:
+class Figures(TypedDict):
+    """A product of figures: (figure, mask, threshold)."""
+
+    figures: NDArray[np.float64]
+
+
+class Rated(TypedDict):
+    """The map before filtering, its confidence and the truth."""
+
+    disparity: DisparityMap
+    confidence: Confidence
+    truth: Truth
+
+
+def compute_ranking(_: NoParams, inputs: Rated) -> Figures:
     """Compute the product ``ranking``: each of ``RANKED`` for each of ``MASKS`` and ``THRESHOLDS``.
 
     Raises:
         StageError: if a map has not the shape of the ground truth.
     """
-    truth: Array = inputs["truth"]["disparity"]
+    truth = inputs["truth"]["disparity"]
     disparity, confidence = inputs["disparity"]["disparity"], inputs["confidence"]["confidence"]
     nonocc = inputs["truth"]["nonocc"]
     for name, array in (("disparity", disparity), ("confidence", confidence), ("nonocc", nonocc)):

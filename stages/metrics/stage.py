@@ -1,13 +1,13 @@
 """The figures of one scene: the product ``metrics`` and its rows for machines."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
 from semidense.stages.metrics.errors import MASKS, QUANTILES, THRESHOLDS, Errors, pixels_of, require_equal
-from semidense.stages.metrics.ranking import AXES, DIMS, RANKED
-from semidense.stages.stage import Array, Arrays, Inputs, NoParams, Output, Stage
+from semidense.stages.metrics.ranking import AXES, DIMS, RANKED, Figures
+from semidense.stages.stage import Array, Arrays, DisparityMap, NoParams, Output, Stage, Truth
 
 FIGURES = ("pixels", "raw_bad", "bad", "invalid", "avgerr", "rms", *QUANTILES, "auc", "auc_optimal")
 """The order of the figure axis. Those that know no threshold are the same at each."""
@@ -46,7 +46,15 @@ def by_name(figures: Array, names: Sequence[str] = FIGURES) -> dict[str, Array]:
     return found | {"pixels": found["pixels"].astype(np.int64)}
 
 
-def compute_metrics(_: NoParams, inputs: Inputs) -> Arrays:
+class Filtered(TypedDict):
+    """The filtered map, the truth, and the figures of the map before filtering."""
+
+    semidense: DisparityMap
+    truth: Truth
+    ranking: Figures
+
+
+def compute_metrics(_: NoParams, inputs: Filtered) -> Figures:
     """Compute the product ``metrics``: each of ``FIGURES`` for each of ``MASKS`` and ``THRESHOLDS``.
 
     Raises:

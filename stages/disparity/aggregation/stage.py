@@ -1,6 +1,6 @@
 """The products ``aggregated`` and ``right_aggregated``: the disparity of least aggregated cost, and its evidence."""
 
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from semidense.stages.disparity.aggregation.winner import NONE, parabola, winner
 from semidense.stages.disparity.declaration import AggregatedParams
 from semidense.stages.disparity.evidence import FEATURES, evidence
 from semidense.stages.disparity.right_view import right_costs
-from semidense.stages.stage import Arrays, Inputs, StageError
+from semidense.stages.stage import CostVolume, Images, StageError
 from semidense.stages.transforms.gray import to_gray
 
 
@@ -29,7 +29,21 @@ class MirroredRight:
         return right_costs(np.asarray(self._left[rows]), self._d_min)[:, ::-1]
 
 
-def compute_aggregated(params: AggregatedParams, inputs: Inputs) -> Arrays:
+class Aggregated(TypedDict):
+    """The product ``aggregated``: (y, x) disparities in px, NaN: none; (feature, y, x) what the costs say of them."""
+
+    disparity: NDArray[np.float32]
+    evidence: NDArray[np.float16]
+
+
+class OfCosts(TypedDict):
+    """The views and the costs, which are read strip by strip."""
+
+    images: Images
+    costvolume: CostVolume
+
+
+def compute_aggregated(params: AggregatedParams, inputs: OfCosts) -> Aggregated:
     """Compute the product ``aggregated``; see ``aggregate``, ``winner``, ``parabola`` and ``evidence``.
 
     Raises:
@@ -38,14 +52,17 @@ def compute_aggregated(params: AggregatedParams, inputs: Inputs) -> Arrays:
     return _maps(params, *_volume(inputs), to_gray(inputs["images"]["left"]))
 
 
-def compute_right_aggregated(params: AggregatedParams, inputs: Inputs) -> Arrays:
+def compute_right_aggregated(params: AggregatedParams, inputs: OfCosts) -> Aggregated:
     """Compute the product ``right_aggregated``: the same of the right view, by the same volume."""
     volume, d_min = _volume(inputs)
     made = _maps(params, MirroredRight(volume, d_min), d_min, to_gray(inputs["images"]["right"])[:, ::-1])
-    return {name: np.ascontiguousarray(array[..., ::-1]) for name, array in made.items()}
+    return {
+        "disparity": np.ascontiguousarray(made["disparity"][:, ::-1]),
+        "evidence": np.ascontiguousarray(made["evidence"][..., ::-1]),
+    }
 
 
-def _volume(inputs: Inputs) -> tuple[Volume, int]:
+def _volume(inputs: OfCosts) -> tuple[Volume, int]:
     """Return the volume, not read yet, and its smallest disparity."""
     volume, d = inputs["costvolume"]["cost"], np.asarray(inputs["costvolume"]["d"])
     if d.size == 0 or volume.shape[2:] != d.shape:
@@ -53,7 +70,7 @@ def _volume(inputs: Inputs) -> tuple[Volume, int]:
     return volume, int(d[0])
 
 
-def _maps(params: AggregatedParams, volume: Volume, d_min: int, gray: NDArray[np.uint8]) -> Arrays:
+def _maps(params: AggregatedParams, volume: Volume, d_min: int, gray: NDArray[np.uint8]) -> Aggregated:
     """Return disparity and evidence, filled strip by strip."""
     disparity = np.empty(gray.shape, np.float32)
     found = np.empty((len(FEATURES), *gray.shape), np.float16)
