@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, Protocol, TypeAlias, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from semidense.datasets.arrays import DisparityMap, ImageArray, Mask
 from semidense.datasets.errors import DatasetError
@@ -168,6 +169,9 @@ class SceneReader(Protocol):
     def read_truth(self, files: Mapping[str, Path], parameters: Mapping[str, Parameter]) -> Truth:
         """Read the ground truth; called only where there is one."""
 
+    def read_costs(self, files: Mapping[str, Path], parameters: Mapping[str, Parameter]) -> NDArray[np.float16]:
+        """Read the cost volume (y, x, d) of another matcher; called only where the role ``costs`` has a file."""
+
 
 @dataclass(frozen=True)
 class SceneSource:
@@ -221,6 +225,15 @@ class SceneSource:
         self._check_size("images", left)
         return left, right
 
+    def load_costs(self) -> NDArray[np.float16]:
+        """Read the cost volume that came with the scene, (y, x, d); raises what `load` raises."""
+        with exact_files(self.files, self.digests) as files:
+            costs = self._reader().read_costs(files, self.parameters)
+        self._check_size("cost volume", costs)
+        if costs.shape[2] != self.disparities.count:
+            raise DatasetError(f"{self.name}: {costs.shape[2]} disparities, but {self.disparities.count} were listed")
+        return costs
+
     def load_truth(self) -> Truth | None:
         """Read the ground truth only, None where there is none; raises what `load` raises."""
         if not self.has_truth:
@@ -253,6 +266,10 @@ class SceneSource:
     def truth_identity(self) -> dict[str, Any]:
         """Name the content that the truth is read from; see `identity`."""
         return self.identity(TRUTH_ROLES)
+
+    def costs_identity(self) -> dict[str, Any]:
+        """Name the content that the cost volume is read from; see `identity`."""
+        return self.identity(("costs",))
 
     def _reader(self) -> SceneReader:
         return cast(SceneReader, import_module(self.reader))

@@ -4,8 +4,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from semidense.datasets.arrays import ImageArray
+from semidense.datasets.formats import costs
 from semidense.datasets.formats.images import read_image
 from semidense.datasets.readers import read_pair
 from semidense.datasets.scene import Parameter
@@ -26,6 +28,11 @@ def read_images(files: Mapping[str, Path], parameters: Mapping[str, Parameter]) 
             return harmonised(whole[:, :columns], whole[:, columns:])
         return harmonised(whole[:rows], whole[rows:])
     return harmonised(*read_pair(files))
+
+
+def read_costs(files: Mapping[str, Path], _: Mapping[str, Parameter]) -> NDArray[np.float16]:
+    """Read the cost volume (y, x, d) that came with the pair; raises `DatasetError` if it is not valid."""
+    return costs.read_costs(files["costs"])
 
 
 def harmonised(left: ImageArray, right: ImageArray) -> tuple[ImageArray, ImageArray]:

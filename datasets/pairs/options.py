@@ -25,6 +25,8 @@ class PairOptions:
         d_min: Smallest disparity to search, pixels.
         d_max: Largest one.
         split: How one picture holds both views: one of `SPLITS`; None if each view has its own file.
+        costs: A NumPy file with a cost volume (y, x, d) of the pair, which takes the place of the matching-Net's; its
+            first disparity is ``d_min``.
 
     Raises:
         DatasetError: If ``split`` is not known.
@@ -35,6 +37,7 @@ class PairOptions:
     d_min: int | None = None
     d_max: int | None = None
     split: str | None = None
+    costs: str | None = None
 
     def __post_init__(self) -> None:
         if self.split is not None and self.split not in SPLITS:

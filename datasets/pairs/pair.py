@@ -6,6 +6,7 @@
     pair:left.png,right.png,d_min=0,d_max=63                  one pair, its range known
     pair:camera/left,camera/right,calib=calib.txt             two folders, paired by name
     pair:shot*_L.jpg,shot*_R.jpg,calib=l.yaml,calib=r.yaml    two patterns, a ROS calibration
+    pair:left.png,right.png,d_min=0,costs=volume.npy          one pair, with the costs of another matcher (y, x, d)
     pair:pairs.csv                                            lines left,right[,calibration]
     pair:video/,split=side-by-side                            every picture holds both views; or over-under
 
@@ -21,6 +22,7 @@ from typing import Any
 from semidense.datasets.errors import DatasetError
 from semidense.datasets.formats.calibration.cameras import PairCalibration
 from semidense.datasets.formats.calibration.reading import read_cameras
+from semidense.datasets.formats.costs import costs_shape
 from semidense.datasets.formats.images import image_size
 from semidense.datasets.pairs.lists import LISTS, read_list
 from semidense.datasets.pairs.options import PATTERN, PairOptions, parse
@@ -36,6 +38,8 @@ def list_scenes(argument: str) -> tuple[SceneSource, ...]:
     """
     sides, options = parse(argument)
     pairs = _listed(sides, options)
+    if options.costs and len(pairs) > 1:
+        raise DatasetError(f"costs={options.costs}: a volume belongs to one pair, but there are {len(pairs)}; name one")
     wanted = {_calibration_of(pair, options) for pair in pairs}
     known = {each: read_cameras(each[0], options.unit, each[1]) for each in wanted if each[0]}
     return tuple(_source(pair, options, known.get(_calibration_of(pair, options))) for pair in pairs)
@@ -64,8 +68,25 @@ def _calibration_of(pair: Pair, options: PairOptions) -> tuple[tuple[Path, ...],
 
 def _source(pair: Pair, options: PairOptions, known: PairCalibration | None) -> SceneSource:
     files = {"left": pair.left, "right": pair.right}
+    if options.costs:
+        files["costs"] = Path(options.costs).expanduser()
+        options = _with_range_of_costs(files["costs"], options)
     source = SceneSource(**described(pair.name, _view_size(pair, options), options, known), files=files)
     return replace(source, warnings=(*pair.warnings, *source.warnings))
+
+
+def _with_range_of_costs(path: Path, options: PairOptions) -> PairOptions:
+    """Return the options with the range that a cost volume covers.
+
+    Raises:
+        DatasetError: If the range that was given is another.
+    """
+    first, count = options.d_min or 0, costs_shape(path)[2]
+    if options.d_max not in (None, first + count - 1):
+        raise DatasetError(
+            f"{path}: {count} disparities from {first} px on, but d_max={options.d_max} was given; leave it out"
+        )
+    return replace(options, d_min=first, d_max=first + count - 1)
 
 
 def _view_size(pair: Pair, options: PairOptions) -> tuple[int, int]:

@@ -18,7 +18,7 @@ from semidense.datasets import SceneSource
 from semidense.pipeline.plan.config import Config, nearest, one_line
 from semidense.pipeline.plan.environment import environment
 from semidense.pipeline.plan.errors import UsageError
-from semidense.pipeline.plan.images_and_truth import SOURCES, Source
+from semidense.pipeline.plan.images_and_truth import Source, source_of
 from semidense.pipeline.plan.shipped_weights import Weights, own_weights, shipped_weights, weights_stage
 from semidense.pipeline.plan.steps import (
     SPLIT,
@@ -118,8 +118,8 @@ class _Builder:
         return self.known[asked]
 
     def _add_product(self, product: str, scene: SceneSource | None) -> str:
-        if product in SOURCES and scene:
-            return self._add_source(SOURCES[product], scene)
+        if scene and (source := source_of(product, scene)):
+            return self._add_source(source, scene)
         if product not in STAGES:
             raise UsageError(f"{product} is read from a scene: name a dataset")
         if STAGES[product].learnt and (weights := self._weights(product)):

@@ -1,4 +1,4 @@
-"""Products that are read, not computed: the images and the truth of a scene.
+"""Products that are read, not computed: the images and the truth of a scene, and costs that another matcher made.
 
 They are cached like all others, so that every stage below reads from the cache alone, wherever it runs,
 and a source file that changes makes stale exactly what depends on it. Their functions are given the
@@ -42,6 +42,15 @@ TRUTH = Stage(
     ),
     compute="semidense.pipeline.plan.images_and_truth:read_truth",
 )
+COSTS = Stage(
+    product="costvolume",
+    inputs=(),
+    outputs=(
+        Output("cost", ("y", "x", "d"), "float16", "1", "cost of another matcher; lower is better, NaN: no such cell"),
+        Output("d", ("d",), "int16", "px", "disparity"),
+    ),
+    compute="semidense.pipeline.plan.images_and_truth:read_costs",
+)
 
 
 @dataclass(frozen=True)
@@ -51,10 +60,12 @@ class Source:
     Attributes:
         stage: its declaration.
         identity: names the content that it is read from, for the key.
+        role: of the file without which it is not read but computed; None: it is always read.
     """
 
     stage: Stage
     identity: Callable[[SceneSource], Mapping[str, Any]]
+    role: str | None = None
 
 
 def _truth_identity(scene: SceneSource) -> dict[str, Any]:
@@ -62,8 +73,30 @@ def _truth_identity(scene: SceneSource) -> dict[str, Any]:
     return scene.truth_identity() | {"range": bounds}
 
 
-SOURCES = {"images": Source(IMAGES, SceneSource.image_identity), "truth": Source(TRUTH, _truth_identity)}
+def _costs_identity(scene: SceneSource) -> dict[str, Any]:
+    return scene.costs_identity() | {"d_min": scene.disparities.minimum}
+
+
+SOURCES = {
+    "images": Source(IMAGES, SceneSource.image_identity),
+    "truth": Source(TRUTH, _truth_identity),
+    "costvolume": Source(COSTS, _costs_identity, role="costs"),
+}
 """By product."""
+
+
+def source_of(product: str, scene: SceneSource) -> Source | None:
+    """Return how a product of a scene is read; None if it is computed."""
+    found = SOURCES.get(product)
+    return found if found and (found.role is None or found.role in scene.files) else None
+
+
+def read_costs(scene: SceneSource, _: Inputs) -> dict[str, Array]:
+    """Return the cost volume that came with a scene, without the cells that lie outside the right view."""
+    cost, d = scene.load_costs(), np.arange(scene.disparities.minimum, scene.disparities.maximum + 1, dtype=np.int16)
+    matched = np.arange(cost.shape[1])[:, None] - d  # column of the right view
+    cost[:, (matched < 0) | (matched >= cost.shape[1])] = np.nan
+    return {"cost": cost, "d": d}
 
 
 def read_images(scene: SceneSource, _: Inputs) -> dict[str, Array]:

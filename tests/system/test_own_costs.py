@@ -1,0 +1,80 @@
+"""A cost volume of another matcher goes through the whole pipeline: winner, aggregation, confidence, filtering."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from semidense.datasets import DatasetError
+from semidense.pipeline import api
+from semidense.pipeline.api import Task
+from semidense.pipeline.plan.images_and_truth import COSTS
+from semidense.stages.matching.declaration import COST_VOLUME
+
+FAST = ("costvolume.mode=fast",)
+
+
+@pytest.fixture
+def pair(tmp_path: Path) -> Path:
+    """A pair of noise, 3 px apart, and a volume whose winner is 5 px everywhere: it is read, nobody computes it."""
+    wide = np.random.default_rng(0).integers(0, 256, (40, 51), np.uint8)
+    for name, view in (("left.png", wide[:, :48]), ("right.png", wide[:, 3:])):
+        Image.fromarray(view).save(tmp_path / name)
+    costs = np.full((40, 48, 8), 4.0, np.float32)
+    costs[..., 3] = 0.0
+    np.save(tmp_path / "volume.npy", costs)
+    return tmp_path
+
+
+def spec(pair: Path, *options: str) -> str:
+    return ",".join((f"pair:{pair}/left.png", f"{pair}/right.png", f"costs={pair}/volume.npy", *options))
+
+
+def test_the_volume_takes_the_place_of_the_networks(pair: Path) -> None:
+    task = Task(spec(pair, "d_min=2"), settings=FAST, cache=pair / "cache")
+    result = api.run(task, "semidense")
+    made = {each.step.product for each in result.made.values()}
+    assert made.isdisjoint({"channels", "matching_net", "descriptor_net"})
+    assert result.open("costvolume")["d"].values.tolist() == list(range(2, 10))
+    disparity = result.open("disparity")["disparity"].values
+    assert np.unique(disparity[:, 5:]).tolist() == [5.0]
+    assert np.isnan(disparity[:, :2]).all(), "there, all cells lie outside the right view"
+
+
+def test_aggregation_works_on_it(pair: Path) -> None:
+    task = Task(spec(pair), settings=(*FAST, "use.disparity=aggregated", "aggregated.subpixel=false"), cache=pair / "c")
+    disparity = api.run(task, "disparity").open("disparity")["disparity"].values
+    assert np.unique(disparity[:, 3:]).tolist() == [3.0]
+
+
+def test_its_content_is_in_the_key(pair: Path) -> None:
+    task = Task(spec(pair), settings=FAST, cache=pair / "cache")
+    first = api.explain(task, "costvolume").key
+    np.save(pair / "volume.npy", np.zeros((40, 48, 8), np.float32))
+    assert api.explain(task, "costvolume").key != first
+    assert api.explain(Task(spec(pair, "d_min=1"), settings=FAST, cache=pair / "cache"), "costvolume").key != first
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        pytest.param(("d_min=0", "d_max=9"), "8 disparities from 0 px on, but d_max=9", id="another range"),
+        pytest.param(("d_min=60",), "wide", id="outside the image"),
+    ],
+)
+def test_a_range_that_does_not_fit_is_refused(options: tuple[str, ...], message: str, pair: Path) -> None:
+    with pytest.raises(DatasetError, match=message):
+        Task(spec(pair, *options)).open()
+
+
+def test_a_volume_of_another_size_is_refused(pair: Path) -> None:
+    np.save(pair / "volume.npy", np.zeros((40, 47, 8), np.float32))
+    with pytest.raises(ValueError, match="cost volume of 40 x 47, but 40 x 48 was listed"):
+        api.run(Task(spec(pair), settings=FAST, cache=pair / "cache"), "costvolume")
+
+
+def test_both_kinds_of_volume_are_declared_alike() -> None:
+    assert [(each.name, each.dims, each.dtype) for each in COSTS.outputs] == [
+        (each.name, each.dims, each.dtype) for each in COST_VOLUME.outputs
+    ]
