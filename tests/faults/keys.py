@@ -80,7 +80,7 @@ def _settings(tally: Tally) -> None:
                 if getattr(config, section) == params:
                     continue
                 tally.injected += 1
-                changed = {product for product in before if before[product] != after[product]}
+                changed = {product for product in before.keys() & after.keys() if before[product] != after[product]}
                 reached = below(section) & set(before)  # not products that are made only when asked for
                 expected = reached if _may_matter(section, name, value) else frozenset()
                 if changed != expected:
