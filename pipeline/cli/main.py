@@ -63,13 +63,15 @@ def main() -> None:
     except _Stopped as stop:
         _leave(128 + int(stop.args[0]))
     except Exception as error:
-        from semidense.pipeline.plan.errors import told
+        from semidense.pipeline.plan.errors import USER_ERRORS, told
 
         if (line := told(error)) is None:
             raise
         print(f"pipeline: {line}", file=sys.stderr)
-        if isinstance(error, OSError) and error.filename is None:
-            _leave(2)  # the end of Python would try to write again, and say so at length
+        if isinstance(error, OSError) and not isinstance(error, USER_ERRORS) and error.filename is None:
+            _leave(
+                2
+            )  # standard output is full or closed: the end of Python would try to write again, and say so at length
         raise SystemExit(2) from None
 
 

@@ -99,7 +99,7 @@ def sweep(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Compare error and density at many thresholds R, and over other settings.
+    """Compare error and density at many thresholds R.
 
     --set section.field=value1,value2 tries several values of any setting.
     """

@@ -7,6 +7,7 @@ from pydantic_core import to_jsonable_python
 from semidense.cache import Entry
 from semidense.cache.entries.index import Index, inputs_of
 from semidense.pipeline.plan.config import Config
+from semidense.pipeline.plan.environment import former_version
 from semidense.pipeline.results.text import value_text
 
 DEFAULTS = "defaults"
@@ -20,7 +21,12 @@ class Settings:
         self._known: dict[str, frozenset[str]] = {}
 
     def text(self, entry: Entry) -> str:
-        """Return the settings, such as ``channels.rank_window=15 semidense.R=0.8``, or that they are the defaults."""
+        """Return the settings, such as ``channels.rank_window=15 semidense.R=0.8``, or that they are the defaults.
+
+        An entry of another version of the project names that version: its settings meant something else.
+        """
+        if (version := former_version(entry)) is not None:
+            return f"of version {version}"
         return " ".join(sorted(self._of(entry))) or DEFAULTS
 
     def _of(self, entry: Entry) -> frozenset[str]:

@@ -5,14 +5,16 @@ import pytest
 import torch
 
 from semidense.stages.compute import precision
-from semidense.stages.compute.precision import autocast, cpu_flags, fast_bfloat16, resolve
+from semidense.stages.compute.precision import autocast, cpu_facts, cpu_flags, fast_bfloat16, resolve
 
 
 @pytest.fixture(autouse=True)
 def _asked_again() -> Iterator[None]:
-    cpu_flags.cache_clear()
+    for known in (cpu_facts, cpu_flags):
+        known.cache_clear()
     yield
-    cpu_flags.cache_clear()
+    for known in (cpu_facts, cpu_flags):
+        known.cache_clear()
 
 
 @pytest.mark.parametrize(
