@@ -68,7 +68,7 @@ def main() -> None:
         if (line := told(error)) is None:
             raise
         print(f"pipeline: {line}", file=sys.stderr)
-        if isinstance(error, OSError) and error.filename is None:
+        if isinstance(error, OSError) and error.errno and error.filename is None:
             _leave(2)  # the end of Python would try to write again, and say so at length
         raise SystemExit(2) from None
 
