@@ -179,7 +179,7 @@ def _carry_out(
     summaries = save_all(found, output, kinds)
     for each in found:
         for warning in each.warnings:
-            where = "" if warning in each.scene.warnings else " (see survey.png)"
+            where = " (see survey.png)" if warning in each.misfits else ""
             print(f"warning: {each.scene.name}: {warning}{where}", file=sys.stderr)
     if as_json:
         console.print_json({"pairs": summaries})

@@ -210,11 +210,15 @@ class Match:
     @property
     def warnings(self) -> list[str]:
         """What looks wrong with the pair: files, calibration, or exchanged, unrectified, identical or blank views."""
-        searched = None if self.scene.open_ends else self.disparities
-        found = findings(self.survey, searched, self.scene.calibration)
         views = self._find("distinctiveness")
         blank = without_texture(self.result.store.read(views.key)) if views else ()
-        return [*self.scene.warnings, *found, *blank]
+        return [*self.scene.warnings, *self.misfits, *blank]
+
+    @cached_property
+    def misfits(self) -> list[str]:
+        """Those of the warnings that tell how the views do not fit together: a picture of ``survey`` shows where."""
+        searched = None if self.scene.open_ends else self.disparities
+        return findings(self.survey, searched, self.scene.calibration)
 
     def made(self, product: str) -> Made:
         """Return the result of one of the pair's products.

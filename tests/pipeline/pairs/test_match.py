@@ -320,6 +320,19 @@ def test_a_calibration_does_not_cut_off_negative_disparities(folder: Path) -> No
     assert found.disparities.maximum == 8, "the calibration's end stays"
     assert np.median(found.raw[:, 16:64]) < -1
     assert "exchanged" in found.warnings[0]
+    save(found, folder / "exchanged", ["npy"])
+    assert (folder / "exchanged" / "survey.png").is_file()
+
+
+def test_a_blank_region_is_told_without_a_picture_of_matches(folder: Path, tmp_path: Path) -> None:
+    left, right = (np.array(Image.open(folder / f"{name}.png")) for name in ("left", "right"))
+    left[20:44], right[20:44] = 255, 255
+    found = match(left, right, d_min=0, d_max=8, cache=folder / "cache")
+    silent = (24 + 2 * 6) / 64  # the rows painted over, and the margin of 6 px around them
+    assert [line.partition("is blank")[0] for line in found.warnings] == [f"{100 * silent:.0f} % of the left view "]
+    assert not np.isfinite(found.disparity[24:40]).any()
+    save(found, tmp_path / "out", ["npy"])
+    assert not (tmp_path / "out" / "survey.png").exists(), "it shows matches, of which there are none in the region"
 
 
 def test_what_contradicts_itself_in_the_calibration_is_told(folder: Path) -> None:
