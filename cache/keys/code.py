@@ -136,7 +136,11 @@ def source_hash(text: str | bytes) -> str:
     Raises:
         SyntaxError, ValueError: if it is no Python.
     """
-    return hashlib.sha256(ast.dump(bare_tree(text)).encode("utf-8", "surrogatepass")).hexdigest()
+    return _tree_hash(bare_tree(text))
+
+
+def _tree_hash(bare: ast.AST) -> str:
+    return hashlib.sha256(ast.dump(bare).encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def _parents(module: str) -> Iterator[str]:
@@ -196,7 +200,8 @@ def _read(module: _Module) -> _Source:
     file, is_imported = module.file or Path(), module.name in sys.modules
     try:
         stamp, data = stamp_of(file), file.read_bytes()
-        imports, hashed = frozenset(_imports(ast.parse(data), module)), source_hash(data)
+        tree = ast.parse(data)
+        imports, hashed = frozenset(_imports(tree, module)), _tree_hash(_Bare().visit(tree))
     except (OSError, SyntaxError, ValueError, RecursionError) as error:
         raise SourceNotFound(f"cannot read the source {module.file}: {error}") from error
     if is_imported:

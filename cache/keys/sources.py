@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from semidense.cache.errors import CacheError
 from semidense.cache.files import make_folder, remove
-from semidense.cache.keys.code import bare_tree, source_hash, source_text
+from semidense.cache.keys.code import bare_tree, module_hash, source_hash, source_text
 from semidense.cache.layout import Layout
 
 LONGEST = 1 << 20
@@ -49,7 +49,7 @@ def keep_sources(layout: Layout, code: Mapping[str, str]) -> None:
         with suppress(CacheError, OSError):
             layout.require_cache()
             path = layout.source(code_hash)
-            if path.exists() or (text := source_text(module)) is None or source_hash(text) != code_hash:
+            if path.exists() or module_hash(module) != code_hash or (text := source_text(module)) is None:
                 continue
             make_folder(path.parent)
             temporary = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}")

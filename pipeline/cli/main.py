@@ -69,9 +69,7 @@ def main() -> None:
             raise
         print(f"pipeline: {line}", file=sys.stderr)
         if isinstance(error, OSError) and not isinstance(error, USER_ERRORS) and error.filename is None:
-            _leave(
-                2
-            )  # standard output is full or closed: the end of Python would try to write again, and say so at length
+            _leave(2)  # the output is full or closed: the end of Python would try to write again, and say so at length
         raise SystemExit(2) from None
 
 

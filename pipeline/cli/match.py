@@ -20,7 +20,7 @@ from semidense.pipeline.cli.options import (
     chosen,
     config_file,
 )
-from semidense.pipeline.plan.presets import DEFAULT
+from semidense.pipeline.plan.presets import OWN_PAIRS
 
 if TYPE_CHECKING:
     from semidense.pipeline.api import Task
@@ -76,19 +76,28 @@ def match(
     max_error: Annotated[
         str | None,
         typer.Option(
-            "--max-error", help="Instead of --R: keep as many pixels as this share of errors allows, such as 2%."
+            "--max-error",
+            help="Instead of --R: keep as many pixels as this share of errors allows, such as 2%; needs a calibration, "
+            "which --preset paper has.",
         ),
     ] = None,
     calibrated: Annotated[
         bool,
         typer.Option(
-            "--calibrated", help="Turn the confidence into a measured probability of being right; --R then means it."
+            "--calibrated",
+            help="Turn the confidence into a measured probability of being right, which --R then means; needs a "
+            "calibration, which --preset paper has.",
         ),
     ] = False,
     left_right: Annotated[
         bool, typer.Option("--left-right", help="Drop disparities that the right view's map contradicts.")
     ] = False,
-    subpixel: Annotated[bool, typer.Option("--subpixel", help="Refine disparities to fractions of a pixel.")] = False,
+    subpixel: Annotated[
+        bool,
+        typer.Option(
+            "--subpixel", help="Refine whole disparities to fractions of a pixel; --preset robust does so without it."
+        ),
+    ] = False,
     fill: Annotated[
         bool,
         typer.Option(
@@ -101,7 +110,7 @@ def match(
         list[str] | None, typer.Option("--scene", help="Match this pair only; repeat the option for several.")
     ] = None,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = OWN_PAIRS,
     mode: ModeOption = None,
     config: ConfigOption = None,
     dry_run: DryRunOption = False,
@@ -170,7 +179,7 @@ def _carry_out(
     summaries = save_all(found, output, kinds)
     for each in found:
         for warning in each.warnings:
-            where = "" if warning in each.scene.warnings else " (see survey.png)"
+            where = " (see survey.png)" if warning in each.misfits else ""
             print(f"warning: {each.scene.name}: {warning}{where}", file=sys.stderr)
     if as_json:
         console.print_json({"pairs": summaries})

@@ -20,7 +20,8 @@ PresetOption = Annotated[
     str,
     typer.Option(
         "--preset",
-        help="Settings to start from: paper, or robust: fewer wrong pixels where texture is thin.",
+        help="Settings to start from: paper (the method of the paper), or robust (fewer wrong pixels where texture is "
+        "thin).",
     ),
 ]
 ModeOption = Annotated[

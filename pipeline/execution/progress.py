@@ -4,7 +4,7 @@ import sys
 import threading
 import time
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
@@ -13,6 +13,9 @@ from rich.text import Text
 from semidense.cache import Draft
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.steps import Step
+
+if TYPE_CHECKING:
+    from semidense.stages.compute.compiling import Compiling
 
 LINE_SECONDS = 20.0
 """Where there is no terminal, a product that takes long says so at most this often."""
@@ -44,6 +47,7 @@ class ProgressWatch:
         )
         self._rows: dict[str, _Row] = {}
         self._lock = threading.Lock()
+        self._compiling: Compiling | None = None
 
     def __enter__(self) -> Self:
         self._bars.start()
@@ -53,12 +57,20 @@ class ProgressWatch:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._bars.stop()
+        if self._compiling:
+            self._compiling.stop()
 
     def begun(self, step: Step, draft: Draft, tiles: int) -> None:
         """Add a bar."""
         with self._lock:
+            self._compiling = self._compiling or self._listen()
             task = self._bars.add_task(step.name, total=tiles, note="")
             self._rows[step.id] = _Row(int(task), time.monotonic())
+
+    def _listen(self) -> "Compiling":
+        from semidense.stages.compute.compiling import Compiling  # with Numba, which a run that makes nothing spares
+
+        return Compiling(lambda: self._console.print("compiling loops, once a machine: later runs begin at once"))
 
     def waiting(self, step: Step, holder: str) -> None:
         """Say that another process is making the product."""

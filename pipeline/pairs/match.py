@@ -18,7 +18,8 @@ from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import findings, without_texture
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made
-from semidense.pipeline.plan.presets import DEFAULT
+from semidense.pipeline.plan.presets import OWN_PAIRS
+from semidense.pipeline.plan.shipped_weights import weights_of
 from semidense.pipeline.plan.steps import SPLIT
 from semidense.pipeline.results.result import Result
 from semidense.stages.disparity import depth as geometry
@@ -209,11 +210,15 @@ class Match:
     @property
     def warnings(self) -> list[str]:
         """What looks wrong with the pair: files, calibration, or exchanged, unrectified, identical or blank views."""
-        searched = None if self.scene.open_ends else self.disparities
-        found = findings(self.survey, searched, self.scene.calibration)
         views = self._find("distinctiveness")
         blank = without_texture(self.result.store.read(views.key)) if views else ()
-        return [*self.scene.warnings, *found, *blank]
+        return [*self.scene.warnings, *self.misfits, *blank]
+
+    @cached_property
+    def misfits(self) -> list[str]:
+        """Those of the warnings that tell how the views do not fit together: a picture of ``survey`` shows where."""
+        searched = None if self.scene.open_ends else self.disparities
+        return findings(self.survey, searched, self.scene.calibration)
 
     def made(self, product: str) -> Made:
         """Return the result of one of the pair's products.
@@ -245,7 +250,7 @@ def match(
     calib: str | PathLike[str] | Sequence[str | PathLike[str]] = (),
     unit: Unit | None = None,
     settings: Sequence[str] = (),
-    preset: str = DEFAULT,
+    preset: str = OWN_PAIRS,
     cache: Path | str | None = None,
     watch: Watch | None = None,
     workers: int | None = None,
@@ -261,7 +266,7 @@ def match(
         calib: a calibration file, or a left and a right one of ROS; ``docs/own-pictures.md`` lists the formats.
         unit: of a calibration that does not tell it, such as OpenCV's.
         settings: settings of the configuration, over those of the preset.
-        preset: named settings to start from, ``paper`` or ``robust``.
+        preset: named settings to start from: ``robust``, or ``paper`` for the method of the paper.
         cache: the cache's folder.
         watch: told how it goes on.
         workers: threads; None for one a core.
@@ -285,6 +290,20 @@ def _dataset(left: object, right: object, options: PairOptions) -> Dataset:
     return array_pair(left, right, options)
 
 
+def wished(task: Task, wishes: Wishes) -> Task:
+    """Return the task with the settings that the wishes come down to, checked before any image is read.
+
+    Raises:
+        UsageError: if a setting is not valid.
+        StageError: if the wishes need a calibration, and none is known for such maps.
+    """
+    task = task.and_settings(wishes.settings)
+    config = task.configuration()
+    if wishes.calibrated or wishes.max_error is not None:
+        weights_of(config, "calibration")
+    return task
+
+
 def look(task: Task, watch: Watch | None = None, workers: int | None = None) -> Result:
     """Make the product ``survey`` of every pair."""
     return run(task, "survey", watch=watch, workers=workers)
@@ -298,9 +317,10 @@ def match_all(
     scheduler: str | None = None,
     workers: int | None = None,
 ) -> list[Match]:
-    """Match every pair of a dataset; as `match`, with a ``Task`` for what all verbs share."""
+    """Match every pair of a dataset; as `match`, with a ``Task`` for what all verbs share, its preset too."""
+    task = wished(task, wishes)
     dataset = task.open()
-    task = replace(task.and_settings(wishes.settings), dataset=dataset)
+    task = replace(task, dataset=dataset)
     others = [look(task, watch, workers)]
     result = run(task, wishes.product, watch=watch, scheduler=scheduler, workers=workers)
     if wishes.right_view:

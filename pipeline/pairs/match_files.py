@@ -12,7 +12,7 @@
         points.ply              with a calibration: the coloured points, right side up
         right_disparity.*       if asked for: the right view's raw map
         guessed.png             if holes were filled: white where
-        survey.png              if something looks wrong with the pair: where
+        survey.png              if the views do not fit together: where
 
 The files are made in a hidden folder beside their place and moved when all of them are there. Files of an earlier match
 are replaced or deleted. The pair's own files, and files that ``summary.json`` does not name, are refused.
@@ -158,7 +158,7 @@ class _Writer:
             self.files.append(
                 {"file": "guessed.png", "quantity": "white: filled in, a guess", "reference view": "left"}
             )
-        if self.match.warnings:
+        if self.match.misfits:
             self._draw("survey", "survey.png")
 
     def _draw(self, product: str, name: str) -> None:

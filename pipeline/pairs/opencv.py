@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.pipeline.api import Task
-from semidense.pipeline.pairs.match import Wishes, match
+from semidense.pipeline.pairs.match import Wishes, match, wished
 from semidense.pipeline.plan.config import Settings, nearest, setting_texts
 from semidense.pipeline.plan.errors import UsageError
-from semidense.pipeline.plan.presets import DEFAULT
+from semidense.pipeline.plan.presets import OWN_PAIRS
 
 _WISHES = tuple(field.name for field in fields(Wishes))
 _WITHOUT_COUNTERPART = (
@@ -42,7 +42,7 @@ class StereoMatcher:
         *,
         disp12MaxDiff: float = -1,
         settings: Settings = (),
-        preset: str = DEFAULT,
+        preset: str = OWN_PAIRS,
         cache: Path | str | None = None,
         **wishes: Any,  # noqa: ANN401 - those of Wishes
     ) -> None:
@@ -53,13 +53,14 @@ class StereoMatcher:
             numDisparities: how many, from 1; no multiple of 16 is needed.
             disp12MaxDiff: drop disparities that the right view's map contradicts by more than this, px; below 0: none.
             settings: ``section.field=value`` of the configuration, over those of the preset.
-            preset: named settings to start from.
+            preset: named settings to start from: ``robust``, or ``paper`` for the method of the paper.
             cache: the cache's folder.
             **wishes: attributes of ``semidense.pipeline.pairs.match.Wishes``, such as ``R=0.8``, ``density=0.5`` or
                 ``subpixel=True``.
 
         Raises:
             UsageError: if a name is unknown, a value is not valid, or OpenCV's parameter has no counterpart here.
+            StageError: if an error or calibrated confidences are asked for, and such maps have no calibration.
         """
         low, count = _whole("minDisparity", minDisparity), _whole("numDisparities", numDisparities)
         if count < 1:
@@ -67,7 +68,7 @@ class StereoMatcher:
         _refuse_unknown(wishes)
         if disp12MaxDiff >= 0:
             wishes |= {"left_right": True, "tolerance": float(disp12MaxDiff)}
-        Task(settings=settings, preset=preset).and_settings(Wishes(**wishes).settings).configuration()
+        wished(Task(settings=settings, preset=preset), Wishes(**wishes))
         self._range = range(low, low + count)
         self._how: dict[str, Any] = {
             "settings": setting_texts(settings),

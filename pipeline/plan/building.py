@@ -9,7 +9,6 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
@@ -19,7 +18,7 @@ from semidense.pipeline.plan.config import Config, nearest, one_line
 from semidense.pipeline.plan.environment import environment
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.images_and_truth import Source, source_of
-from semidense.pipeline.plan.shipped_weights import Weights, own_weights, shipped_weights, weights_stage
+from semidense.pipeline.plan.shipped_weights import Weights, weights_of, weights_stage
 from semidense.pipeline.plan.steps import (
     SPLIT,
     Argument,
@@ -38,7 +37,6 @@ from semidense.stages.catalog import READ, STAGES
 from semidense.stages.compute.precision import resolve
 from semidense.stages.evaluation.calibration.declaration import CalibrationParams
 from semidense.stages.evaluation.filtering import SemidenseParams
-from semidense.stages.matching.declaration import CostVolumeParams
 from semidense.stages.stage import Params, Stage
 from semidense.stages.transforms.declaration import ChannelsParams
 
@@ -135,12 +133,8 @@ class _Builder:
 
     def _weights(self, product: str) -> Weights | None:
         """Return the file that stands in for learning a product; None if it is learnt."""
-        if file := self.config.choice("weights", product):
-            return own_weights(product, Path(file).expanduser())
-        if self.request.train and product not in self.config.training.shipped:
-            return None
-        mode = self.config.of("costvolume", CostVolumeParams).mode
-        return shipped_weights(product, mode, self.config.choice("use", "confidence"))
+        trained = self.request.train and product not in self.config.training.shipped
+        return None if trained and not self.config.choice("weights", product) else weights_of(self.config, product)
 
     def _chosen(self, product: str) -> tuple[Stage, Params]:
         """Return the stage that makes a product, and its settings: its own, or the one that ``use`` names.

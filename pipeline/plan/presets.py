@@ -19,3 +19,5 @@ PRESETS: Mapping[str, tuple[str, ...]] = {
 """
 DEFAULT = "paper"
 """The preset of a command that is given none."""
+OWN_PAIRS = "robust"
+"""The preset of ``match`` and ``StereoMatcher``, which work on a user's own pairs, if they are given none."""

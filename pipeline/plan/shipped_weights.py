@@ -7,12 +7,15 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+from semidense.pipeline.plan.config import Config
 from semidense.stages.catalog import STAGES
-from semidense.stages.matching.declaration import Mode
+from semidense.stages.matching.declaration import CostVolumeParams, Mode
 from semidense.stages.stage import Array, Inputs, Stage, StageError
 
 _LEARNT_FROM_MAPS = ("evaluation_net", "calibration")
 """Products of which those for guided volumes are others: the errors of such maps hang together."""
+_CALIBRATED = ("confidence", "disparity")
+"""Products that a calibration is about: it is of no use for those that other stages make."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +52,27 @@ def weights_stage(product: str) -> Stage:
     return Stage(product, (), STAGES[product].outputs, f"{__name__}:read_{form}")
 
 
-def shipped_weights(product: str, mode: Mode, confidence: str | None = None) -> Weights:
-    """Return the package's weights of a product for volumes of a mode, and for the product that makes the confidence.
+def weights_of(config: Config, product: str) -> Weights:
+    """Return the weights of a product that is not trained: the file that the configuration names, or the package's.
+
+    Raises:
+        StageError: if the file cannot be read, or this installation has none for such a configuration.
+    """
+    if file := config.choice("weights", product):
+        return own_weights(product, Path(file).expanduser())
+    made_by = [config.choice("use", name) or name for name in _CALIBRATED]
+    return shipped_weights(product, config.of("costvolume", CostVolumeParams).mode, *made_by)
+
+
+def shipped_weights(
+    product: str, mode: Mode, confidence: str = _CALIBRATED[0], disparity: str = _CALIBRATED[1]
+) -> Weights:
+    """Return the package's weights of a product, for volumes of a mode and what makes the confidence and the map.
 
     Raises:
         StageError: if this installation has none.
     """
-    name = weights_name(product, mode, confidence)
+    name = weights_name(product, mode, confidence, disparity)
     return Weights(product, name, None, weights_digest(name))
 
 
@@ -75,18 +92,19 @@ def _bytes_of(product: str, file: Path) -> bytes:
         raise StageError(f"weights.{product} = {file}: {error.strerror or error}") from None
 
 
-def weights_name(product: str, mode: Mode, confidence: str | None = None) -> str:
-    """Return the name of a product's shipped weights: of a mode's volumes, and of what makes the confidence.
+def weights_name(product: str, mode: Mode, confidence: str = _CALIBRATED[0], disparity: str = _CALIBRATED[1]) -> str:
+    """Return the name of a product's shipped weights, for volumes of a mode and what makes the confidence and the map.
 
-    A calibration says what the numbers of one confidence are worth, and nothing of those of another.
+    A calibration tells how often one kind of map is right at one kind of confidence, and nothing about other kinds.
 
     >>> weights_name("evaluation_net", "guided"), weights_name("matching_net", "guided")
     ('evaluation_net.guided', 'matching_net')
-    >>> weights_name("calibration", "fast", "evidence_confidence")
-    'calibration.evidence_confidence'
+    >>> weights_name("calibration", "fast", "evidence_confidence", "aggregated")
+    'calibration.evidence_confidence.aggregated'
     """
-    if product == "calibration" and confidence:
-        return f"{product}.{confidence}"
+    others = [name for name in (confidence, disparity) if name not in _CALIBRATED]
+    if product == "calibration" and others:
+        return ".".join((product, *others))
     return f"{product}.guided" if mode == "guided" and product in _LEARNT_FROM_MAPS else product
 
 
@@ -129,8 +147,9 @@ def _missing(name: str) -> str:
         return f"no weights for {name} come with this installation: train them with --train"
     if mode not in ("", "guided"):
         return (
-            f"no calibration of {mode} comes with this installation: a wanted error and calibrated probabilities need "
-            "one; give R or a density instead, or a calibration of your own (weights.calibration=FILE)"
+            f"no calibration of {mode.replace('.', ' and ')} comes with this installation: a wanted error and "
+            "calibrated probabilities need one; give R or a density instead, take the preset paper, or give a "
+            "calibration of your own (weights.calibration=FILE)"
         )
     of_mode = f" MODE={mode}" if mode else ""
     return (

@@ -3,6 +3,7 @@ import sys
 from dataclasses import replace
 from typing import Any
 
+import numba
 import pytest
 from rich.console import Console
 
@@ -29,6 +30,16 @@ def test_without_a_terminal_nothing_is_said_of_quick_work(capsys: pytest.Capture
         watch.advanced(TILED, 1, 2, "")
         watch.published(Made(TILED, "k", "d", 0.5, False))
     assert capsys.readouterr() == ("", "")
+
+
+def test_compiling_is_told_once(capsys: pytest.CaptureFixture[str], now: list[float]) -> None:
+    with ProgressWatch() as watch:
+        watch.begun(TILED, NO_DRAFT, 2)
+        watch.begun(TRAINED, NO_DRAFT, 1)
+        for factor in (2, 3):
+            assert numba.njit(lambda x, factor=factor: factor * x)(5) == 5 * factor
+    assert numba.njit(lambda x: 4 * x)(5) == 20, "after the end nothing is said"
+    assert capsys.readouterr().err.splitlines() == ["compiling loops, once a machine: later runs begin at once"]
 
 
 def test_without_a_terminal_long_work_says_a_line_now_and_then(

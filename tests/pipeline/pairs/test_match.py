@@ -19,6 +19,7 @@ from semidense.pipeline.api import Task, run, status
 from semidense.pipeline.pairs.match import Match, Wishes, match, match_all
 from semidense.pipeline.pairs.match_files import save, save_all
 from semidense.pipeline.plan.errors import UsageError
+from semidense.stages.stage import StageError
 
 SCENE = "synthetic:train=0,test=1,height=64,width=80,disparities=8"
 CALIB = (
@@ -92,9 +93,36 @@ def test_arrays_give_the_same_map_and_their_products_are_shared(folder: Path, fo
         _ = given.depth
 
 
+def test_the_preset_is_robust_unless_another_is_named(folder: Path, found: Match) -> None:
+    options = {"d_min": 0, "d_max": 8, "cache": folder / "cache"}
+    files = folder / "left.png", folder / "right.png"
+    assert np.mean(found.raw[np.isfinite(found.raw)] % 1 != 0) > 0.5, "refined below a pixel without being asked"
+    named = match(*files, **options, preset="robust")
+    assert np.array_equal(named.raw, found.raw, equal_nan=True)
+    paper = match(*files, **options, preset="paper")
+    assert np.isfinite(paper.raw).any()
+    assert (paper.raw[np.isfinite(paper.raw)] % 1 == 0).all(), "the winner of single costs is a whole disparity"
+    assert paper.made("costvolume").key != found.made("costvolume").key
+    set_back = match(*files, **options, settings=["aggregated.subpixel=false"])
+    assert (set_back.raw[np.isfinite(set_back.raw)] % 1 == 0).all(), "a setting refines the preset"
+
+
+@pytest.mark.parametrize("wish", [{"max_error": 0.02}, {"calibrated": True}], ids=["an error", "probabilities"])
+def test_a_preset_without_a_calibration_says_so_before_anything_is_made(
+    folder: Path, tmp_path: Path, wish: dict[str, Any]
+) -> None:
+    files = folder / "left.png", folder / "right.png"
+    with pytest.raises(StageError, match=r"no calibration of .*evidence_confidence .*take the preset paper"):
+        match(*files, d_min=0, d_max=8, cache=tmp_path / "cache", **wish)
+    assert not (tmp_path / "cache").exists()
+    with pytest.raises(StageError, match="no calibration of"):
+        pipeline.StereoMatcher(0, 9, **wish)
+    assert match(*files, d_min=0, d_max=8, cache=folder / "cache", preset="paper", **wish).expected_error is not None
+
+
 def test_a_pair_is_a_dataset_like_any_other(folder: Path, found: Match) -> None:
     spec = f"pair:{folder}/left.png,{folder}/right.png,d_min=0,d_max=8"
-    plan = status(Task(spec, cache=folder / "cache"), "confidence")
+    plan = status(Task(spec, cache=folder / "cache", preset="robust"), "confidence")
     assert plan.todo() == ()
 
 
@@ -292,6 +320,19 @@ def test_a_calibration_does_not_cut_off_negative_disparities(folder: Path) -> No
     assert found.disparities.maximum == 8, "the calibration's end stays"
     assert np.median(found.raw[:, 16:64]) < -1
     assert "exchanged" in found.warnings[0]
+    save(found, folder / "exchanged", ["npy"])
+    assert (folder / "exchanged" / "survey.png").is_file()
+
+
+def test_a_blank_region_is_told_without_a_picture_of_matches(folder: Path, tmp_path: Path) -> None:
+    left, right = (np.array(Image.open(folder / f"{name}.png")) for name in ("left", "right"))
+    left[20:44], right[20:44] = 255, 255
+    found = match(left, right, d_min=0, d_max=8, cache=folder / "cache")
+    silent = (24 + 2 * 6) / 64  # the rows painted over, and the margin of 6 px around them
+    assert [line.partition("is blank")[0] for line in found.warnings] == [f"{100 * silent:.0f} % of the left view "]
+    assert not np.isfinite(found.disparity[24:40]).any()
+    save(found, tmp_path / "out", ["npy"])
+    assert not (tmp_path / "out" / "survey.png").exists(), "it shows matches, of which there are none in the region"
 
 
 def test_what_contradicts_itself_in_the_calibration_is_told(folder: Path) -> None:

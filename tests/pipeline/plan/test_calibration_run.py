@@ -183,7 +183,8 @@ def test_the_command_says_what_the_threshold_rests_on(
     table: Path, tmp_path: Path, make_pair: Callable[[Path], Path], invoke: Callable[..., object]
 ) -> None:
     pair = make_pair(tmp_path / "pair")
-    arguments = ["match", pair / "im0.png", pair / "im1.png", "--max-disp", 4, "--cache", tmp_path / "cache"]
+    files = pair / "im0.png", pair / "im1.png"
+    arguments = ["match", *files, "--preset", "paper", "--max-disp", 4, "--cache", tmp_path / "cache"]
     ran = invoke(*arguments, "--max-error", "5%", "-o", tmp_path / "out", "--format", "npy")
     assert ran.code == 0, ran.err
     assert "training scenes that the networks had not seen" in ran.out

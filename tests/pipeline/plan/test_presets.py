@@ -4,7 +4,7 @@ import pytest
 
 from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.errors import UsageError
-from semidense.pipeline.plan.presets import DEFAULT, PRESETS
+from semidense.pipeline.plan.presets import DEFAULT, OWN_PAIRS, PRESETS
 
 
 def test_the_paper_is_the_default_and_changes_nothing() -> None:
@@ -15,6 +15,10 @@ def test_the_paper_is_the_default_and_changes_nothing() -> None:
 @pytest.mark.parametrize("preset", PRESETS)
 def test_a_preset_is_what_its_settings_are(preset: str) -> None:
     assert Config.load(preset=preset) == Config.load(settings=PRESETS[preset])
+
+
+def test_a_users_own_pairs_have_a_preset_that_exists() -> None:
+    assert OWN_PAIRS in PRESETS
 
 
 def test_robust_takes_aggregated_maps_of_both_views() -> None:
