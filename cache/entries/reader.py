@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import zarr
 from zarr.storage import LocalStore
 
+from semidense.cache.entries import forks  # noqa: F401 - importing it makes reads in forked children safe
 from semidense.cache.entries.check import Finding
 from semidense.cache.entries.entry import DATA, Manifest
 from semidense.cache.errors import DamagedEntry

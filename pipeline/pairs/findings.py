@@ -72,5 +72,6 @@ def _unrectified(vertical: Array, step: float) -> Iterator[str]:
     if abs(middle) >= max(_LEAST_OFFSET, step / 2) or high - low >= max(2 * _LEAST_OFFSET, 2 * step):
         yield (
             f"the pair looks unrectified: the right view lies {middle:+.0f} px ({low:+.0f} to {high:+.0f}, measured to "
-            f"{step:g} px) below the left one, where it should lie level; rectify it first"
+            f"{step:g} px) below the left one, where it should lie level; rectify it first with "
+            "`pipeline rectify LEFT RIGHT --calib STEREO_YAML` (docs/own-pictures.md says how to get the calibration)"
         )

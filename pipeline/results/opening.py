@@ -21,6 +21,8 @@ def open_product(store: Store, key: str) -> "xr.Dataset":
     ``created`` are texts, ``seconds`` is a number, and ``label``, ``params``, ``inputs``, ``code``, ``environment``,
     ``extras``, ``size`` and ``version`` are JSON texts, which ``recorded`` reads.
 
+    It can be read after a fork, too: in a ``multiprocessing`` child or a worker of torch's ``DataLoader``.
+
     Raises:
         CacheError: if the entry is missing or damaged.
     """

@@ -27,6 +27,7 @@ RAMP = np.linspace(-1, 1, 1000)
         pytest.param(survey(0.2 * RAMP), "hardly differ", id="a camera that stood still"),
         pytest.param(survey(-20), "exchanged", id="left for right"),
         pytest.param(survey(20, 4), r"unrectified: the right view lies \+4 px", id="one camera lower"),
+        pytest.param(survey(20, 4), "`pipeline rectify LEFT RIGHT --calib", id="the command that helps"),
         pytest.param(survey(20, 6 * RAMP), r"\(-4 to \+4, measured to 1 px\)", id="one camera turned"),
         pytest.param(survey(20, 1, step=6), None, id="less than can be measured"),
         pytest.param(survey(20, count=ENOUGH - 1), "only 99 places agree", id="nothing in common"),
