@@ -13,7 +13,7 @@ from typing import Any, Literal, Protocol, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.datasets.arrays import DisparityMap, ImageArray, Mask
+from semidense.datasets.arrays import DisparityMap, ImageArray, Mask, check_image, check_map, describe, size_text
 from semidense.datasets.errors import DatasetError
 from semidense.datasets.exact_files import exact_files, file_digest
 
@@ -106,18 +106,18 @@ class Truth:
     right: DisparityMap | None = None
 
     def __post_init__(self) -> None:
-        _check_map("truth", self.disparity)
+        check_map("truth", self.disparity)
         if self.nonocc.dtype != np.bool_ or self.nonocc.shape != self.disparity.shape:
             raise DatasetError(
-                f"non-occlusion mask is {_describe(self.nonocc)}; the truth needs bool, {_size(self.disparity)}"
+                f"non-occlusion mask is {describe(self.nonocc)}; the truth needs bool, {size_text(self.disparity)}"
             )
         if np.isnan(self.disparity[self.nonocc]).any():
             raise DatasetError("non-occlusion mask holds pixels whose truth is unknown; clear them first")
         if self.right is not None:
-            _check_map("right truth", self.right)
+            check_map("right truth", self.right)
             if self.right.shape != self.disparity.shape:
                 raise DatasetError(
-                    f"right truth is {_size(self.right)}, left truth {_size(self.disparity)}; both must agree"
+                    f"right truth is {size_text(self.right)}, left truth {size_text(self.disparity)}; both must agree"
                 )
 
 
@@ -146,15 +146,16 @@ class Scene:
 
     def __post_init__(self) -> None:
         for side, image in (("left", self.left), ("right", self.right)):
-            _check_image(f"{self.name}: {side} image", image)
+            check_image(f"{self.name}: {side} image", image)
         if self.left.shape != self.right.shape or self.left.dtype != self.right.dtype:
             raise DatasetError(
-                f"{self.name}: left image is {_describe(self.left)}, right image {_describe(self.right)}; "
+                f"{self.name}: left image is {describe(self.left)}, right image {describe(self.right)}; "
                 "both views must agree"
             )
         if self.truth is not None and self.truth.disparity.shape != self.left.shape[:2]:
             raise DatasetError(
-                f"{self.name}: truth is {_size(self.truth.disparity)}, the images {_size(self.left)}; both must agree"
+                f"{self.name}: truth is {size_text(self.truth.disparity)}, the images {size_text(self.left)}; "
+                "both must agree"
             )
 
 
@@ -278,28 +279,5 @@ class SceneSource:
         if array.shape[:2] != self.size:
             rows, columns = self.size
             raise DatasetError(
-                f"{self.name}: {what} of {_size(array)}, but {rows} x {columns} was listed; list it again"
+                f"{self.name}: {what} of {size_text(array)}, but {rows} x {columns} was listed; list it again"
             )
-
-
-def _size(array: np.ndarray[Any, Any]) -> str:
-    return " x ".join(map(str, array.shape[:2]))
-
-
-def _describe(array: np.ndarray[Any, Any]) -> str:
-    return f"{array.dtype}, {' x '.join(map(str, array.shape)) or 'a scalar'}"
-
-
-def _check_image(what: str, image: ImageArray) -> None:
-    gray_or_rgb = image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)
-    if image.dtype not in (np.uint8, np.uint16) or not gray_or_rgb:
-        raise DatasetError(f"{what} is {_describe(image)}; give uint8 or uint16, (rows, columns) or (rows, columns, 3)")
-    if image.size == 0:
-        raise DatasetError(f"{what} is empty ({_size(image)} pixels)")
-
-
-def _check_map(what: str, disparity: DisparityMap) -> None:
-    if disparity.dtype != np.float32 or disparity.ndim != 2 or disparity.size == 0:
-        raise DatasetError(f"{what} is {_describe(disparity)}; give float32, (rows, columns), not empty")
-    if np.isinf(disparity).any():
-        raise DatasetError(f"{what} holds infinite disparities; mark unknown pixels with NaN")

@@ -14,8 +14,8 @@ from semidense.datasets import Dataset, SceneSource, open_dataset
 from semidense.pipeline.execution.retry import attempt
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.execution.watch import Unwatched, Watch
-from semidense.pipeline.plan.config import Config, Settings, alternatives, setting_texts, shortened, value_text
-from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.config import Config, Settings, alternatives, setting_texts, value_text
+from semidense.pipeline.plan.errors import UsageError, shortened
 from semidense.pipeline.plan.plan import Made, Plan, Planned, close_ranges, make_plan
 from semidense.pipeline.plan.presets import DEFAULT
 from semidense.pipeline.plan.steps import Request

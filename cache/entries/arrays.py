@@ -7,10 +7,15 @@ import struct
 from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from semidense.cache.document import parse
 from semidense.cache.entries.entry import DATA, Manifest
+from semidense.cache.errors import InvalidArray
+
+if TYPE_CHECKING:
+    import numpy as np
+    import zarr
 
 LARGEST_CHUNK = 1 << 32
 """Bytes of one decoded chunk: a reader holds at least one in memory."""
@@ -142,3 +147,30 @@ def _decoded_size(path: Path) -> int | None:
     if not width or len(head) < at + width:
         return None
     return int.from_bytes(head[at : at + width], "little") + (256 if width == 2 else 0)
+
+
+def require_dtype(name: str, dtype: str) -> "np.dtype[Any]":
+    """Return the NumPy type if arrays of it can be stored bit for bit."""
+    import numpy as np
+
+    try:
+        kind = np.dtype(dtype)
+    except TypeError:
+        raise InvalidArray(f"array {name!r}: {dtype!r} is no NumPy type") from None
+    if kind.kind not in "biuf" or not kind.isnative or kind.itemsize > 8:
+        raise InvalidArray(f"array {name!r}: {dtype!r} cannot be stored: use bool, an integer or a float type")
+    return kind
+
+
+def require_aligned(where: str, array: "zarr.Array[Any]", region: tuple[slice, ...]) -> list[tuple[int, int]]:
+    """Return the region's (start, stop) a dimension if it is made of whole chunks."""
+    if len(region) != array.ndim:
+        raise InvalidArray(f"{where}: the region has {len(region)} dimensions, the array {array.ndim}")
+    bounds = []
+    for part, size, chunk in zip(region, array.shape, array.chunks, strict=True):
+        start, stop = part.start or 0, size if part.stop is None else part.stop
+        inside = part.step in (None, 1) and 0 <= start <= stop <= size
+        if not inside or start % chunk or (stop % chunk and stop != size):
+            raise InvalidArray(f"{where}: {part} is not made of whole chunks of {chunk} within {size}: align the tiles")
+        bounds.append((start, stop))
+    return bounds

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from semidense.cache.document import canonical, parse
 from semidense.cache.entries import publish
-from semidense.cache.entries.arrays import chunk_paths
+from semidense.cache.entries.arrays import chunk_paths, require_aligned, require_dtype
 from semidense.cache.entries.entry import DATA, Entry
 from semidense.cache.errors import IncompleteDraft, InvalidArray
 from semidense.cache.files import writing
@@ -22,7 +22,6 @@ from semidense.cache.layout import Layout
 from semidense.cache.processes.locks import Lock
 
 if TYPE_CHECKING:
-    import numpy as np
     import zarr
     from numpy.typing import NDArray
 
@@ -90,7 +89,7 @@ class Draft:
         import zarr
         from zarr.codecs import ZstdCodec
 
-        kind = _require_dtype(name, dtype)
+        kind = require_dtype(name, dtype)
         with self._writing():
             self._require_fit(name, shape, chunks, dims)
             if not (self.path / DATA / "zarr.json").is_file():
@@ -151,7 +150,7 @@ class Draft:
         with self._writing():
             array = self._array(name)
             where = f"array {name!r} of {self.recipe.stage}"
-            bounds = _require_aligned(where, array, region)
+            bounds = require_aligned(where, array, region)
             expected = tuple(stop - start for start, stop in bounds)
             if data.shape != expected or data.dtype != array.dtype:
                 raise InvalidArray(
@@ -289,30 +288,3 @@ class Draft:
                 "write every region before publishing"
             )
         return paths
-
-
-def _require_dtype(name: str, dtype: str) -> "np.dtype[Any]":
-    """Return the NumPy type if arrays of it can be stored bit for bit."""
-    import numpy as np
-
-    try:
-        kind = np.dtype(dtype)
-    except TypeError:
-        raise InvalidArray(f"array {name!r}: {dtype!r} is no NumPy type") from None
-    if kind.kind not in "biuf" or not kind.isnative or kind.itemsize > 8:
-        raise InvalidArray(f"array {name!r}: {dtype!r} cannot be stored: use bool, an integer or a float type")
-    return kind
-
-
-def _require_aligned(where: str, array: "zarr.Array[Any]", region: tuple[slice, ...]) -> list[tuple[int, int]]:
-    """Return the region's (start, stop) a dimension if it is made of whole chunks."""
-    if len(region) != array.ndim:
-        raise InvalidArray(f"{where}: the region has {len(region)} dimensions, the array {array.ndim}")
-    bounds = []
-    for part, size, chunk in zip(region, array.shape, array.chunks, strict=True):
-        start, stop = part.start or 0, size if part.stop is None else part.stop
-        inside = part.step in (None, 1) and 0 <= start <= stop <= size
-        if not inside or start % chunk or (stop % chunk and stop != size):
-            raise InvalidArray(f"{where}: {part} is not made of whole chunks of {chunk} within {size}: align the tiles")
-        bounds.append((start, stop))
-    return bounds

@@ -272,11 +272,8 @@ def _offered(package: str) -> Mapping[str, str]:
         return {}  # reading the package itself says what is wrong
     blocks = (node.body for node in tree.body if _for_checkers(node))
     nodes = [node for body in blocks for node in body if isinstance(node, ast.ImportFrom)]
-    return {
-        alias.asname or alias.name: _absolute("." * node.level + (node.module or ""), located)
-        for node in nodes
-        for alias in node.names
-    }
+    named = [(alias, "." * node.level + (node.module or "")) for node in nodes for alias in node.names]
+    return {alias.asname or alias.name: _absolute(module, located) for alias, module in named}
 
 
 def _absolute(name: str, module: _Module) -> str:

@@ -24,7 +24,8 @@ from semidense.pipeline.plan.presets import OWN_PAIRS
 
 if TYPE_CHECKING:
     from semidense.pipeline.api import Task
-    from semidense.pipeline.pairs.match import Match, Wishes
+    from semidense.pipeline.pairs.match import Match
+    from semidense.pipeline.pairs.wishes import Wishes
 
 _EXAMPLES = {"density": "80% or 0.8", "max-error": "2% or 0.02"}
 
@@ -125,7 +126,7 @@ def match(
     """
     from semidense.datasets.pairs.options import PairOptions, pair_spec
     from semidense.pipeline.api import Task
-    from semidense.pipeline.pairs.match import Wishes
+    from semidense.pipeline.pairs.wishes import Wishes
 
     options = PairOptions(tuple(calib or ()), unit, min_disp, max_disp, split)
     sides = [left] if right is None else [left, right]
@@ -251,8 +252,7 @@ def _share(name: str, text: str | None) -> float | None:
 
 def _formats(text: str) -> list[str]:
     from semidense.pipeline.files.map_files import FORMATS
-    from semidense.pipeline.plan.config import nearest
-    from semidense.pipeline.plan.errors import UsageError
+    from semidense.pipeline.plan.errors import UsageError, nearest
 
     chosen = list(dict.fromkeys(kind.strip() for kind in text.split(",") if kind.strip()))
     for kind in chosen:

@@ -9,26 +9,24 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from semidense.datasets import Dataset, SceneSource, open_dataset
 from semidense.pipeline.api import Task, carry_out
 from semidense.pipeline.comparison.ablation import ABLATION, ablation_request, ablation_rows
+from semidense.pipeline.comparison.methods import LOWERED, MATCHERS, MEASURES, matcher_rows, measure_rows, ours
 from semidense.pipeline.comparison.paper_figures import NAMED
 from semidense.pipeline.comparison.protocols import PROTOCOLS, protocol_requests, require_protocols
 from semidense.pipeline.comparison.rows import (
     Judged,
     Row,
-    auc_rows,
     curve_rows,
     density_rows,
-    equal_density,
     raw_rows,
 )
 from semidense.pipeline.execution.watch import Watch
-from semidense.pipeline.plan.config import nearest, setting_texts
+from semidense.pipeline.plan.config import setting_texts
 from semidense.pipeline.plan.environment import missing_packages
-from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.errors import UsageError, nearest
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.presets import DEFAULT
 from semidense.pipeline.plan.steps import Request
@@ -40,28 +38,6 @@ from semidense.stages.stage import Arrays
 
 EXPERIMENTS = ("raw", "density", "auc")
 """What is compared: dense maps, semi-dense maps, and confidence measures."""
-MATCHERS = {
-    "SGM (OpenCV SGBM)": "sgm",
-    "SNCC": "sncc",
-    "census": "census",
-    "MC-CNN fast": "mc_cnn",
-    "MC-CNN accurate": "mc_cnn_accurate",
-}
-"""Other matchers, by name: their products have a ``dense`` map, and a ``disparity`` after their own checks."""
-LOWERED = "MC-CNN accurate, less 0.5 px"
-"""MC-CNN's accurate weights give disparities about 0.5 px too high, which decides many errors above 1 px."""
-MEASURES = {
-    "evaluation-Net and agreement": ("confidence", "confidence"),
-    "evaluation-Net": ("confidence", "network"),
-    "agreement": ("confidence", "agreement"),
-    "APKR": ("cost_confidence", "apkr"),
-    "O1": ("o1", "confidence"),
-    "CCNN": ("ccnn", "confidence"),
-    "left-right difference": ("cost_confidence", "lrd"),
-    "PKRN": ("cost_confidence", "pkrn"),
-    "cost": ("cost_confidence", "msm"),
-}
-"""Confidence measures of the raw map, by name: product and array."""
 BESIDE = {
     "preset robust, single costs": ("use.disparity=disparity", "use.right_disparity=right_disparity"),
     "preset robust": (),
@@ -273,40 +249,11 @@ def _raw(judged: Judged, products: Mapping[str, Arrays], _: float | None) -> Ite
 def _density(judged: Judged, products: Mapping[str, Arrays], R: float | None) -> Iterator[Row]:
     yield from (row | {"R": R} for row in density_rows(judged, METHOD, products["semidense"]["disparity"]))
     yield from matcher_rows(judged, products)
-    yield from curve_rows(judged, _ours(products))
-
-
-def _ours(products: Mapping[str, Arrays]) -> dict[str, NDArray[np.float32]]:
-    return {name: products[name][name] for name in ("disparity", "confidence")}
-
-
-def matcher_rows(judged: Judged, products: Mapping[str, Arrays]) -> Iterator[Row]:
-    """Yield what the other matchers' semi-dense maps do, and our error at the density of each.
-
-    Args:
-        judged: the scene.
-        products: ``disparity``, ``confidence`` and those of the matchers that are there, by name.
-    """
-    for method, product in MATCHERS.items():
-        if product in products:
-            rows = density_rows(judged, method, products[product]["disparity"])
-            yield from equal_density(rows, judged, _ours(products))
+    yield from curve_rows(judged, ours(products))
 
 
 def _auc(judged: Judged, products: Mapping[str, Arrays], _: float | None) -> Iterator[Row]:
     yield from measure_rows(judged, products)
-
-
-def measure_rows(judged: Judged, products: Mapping[str, Arrays]) -> Iterator[Row]:
-    """Yield the area under the error curve of each confidence measure of the raw map.
-
-    Args:
-        judged: the scene.
-        products: ``disparity`` and those of the measures that are there, by name.
-    """
-    for method, (product, array) in MEASURES.items():
-        if product in products:
-            yield from auc_rows(judged, method, products[product][array], products["disparity"]["disparity"])
 
 
 _EXPERIMENT = {"raw": _raw, "density": _density, "auc": _auc}

@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from semidense.pipeline.comparison.experiments import MATCHERS, Comparison
+from semidense.pipeline.comparison.experiments import Comparison
+from semidense.pipeline.comparison.methods import MATCHERS
 from semidense.pipeline.figures.colours import BLUE, QUIET, RED, disparity_rgb, disparity_span
 from semidense.pipeline.figures.curves import draw_matchers
 from semidense.pipeline.figures.drawing import new_figure

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 from semidense.datasets import Dataset, SceneSource
 from semidense.pipeline.api import Task
-from semidense.pipeline.plan.config import nearest
-from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.errors import UsageError, nearest
 from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.plan.training_split import assign_folds, outside
 

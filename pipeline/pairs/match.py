@@ -16,6 +16,7 @@ from semidense.datasets.pairs.options import PairOptions, pair_spec
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import findings, without_texture
+from semidense.pipeline.pairs.wishes import Wishes
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.presets import OWN_PAIRS
@@ -26,62 +27,6 @@ from semidense.stages.disparity import depth as geometry
 from semidense.stages.evaluation.calibration.table import Outcome, Table, outcome
 
 Unit = Literal["mm", "cm", "m"]
-
-
-@dataclass(frozen=True)
-class Wishes:
-    """What to do with the raw map; by default it is filtered at R = 0.9 and nothing else.
-
-    Attributes:
-        R: least confidence that is kept; None for the configuration's.
-        density: share of the image's pixels to keep instead, the most confident, in (0, 1].
-        max_error: share of wrong pixels to expect among the kept instead, in (0, 1), by the pair's own confidences and
-            how often such were right in training scenes that the networks had not seen.
-        calibrated: take and give the confidence as the probability that was measured there.
-        left_right: drop what the right view's map contradicts by more than ``tolerance`` px.
-        tolerance: px.
-        subpixel: move each disparity to the parabola's lowest point.
-        fill: fill the holes with the background; the map is dense then, and partly guessed.
-        right_view: make the right view's raw map too.
-    """
-
-    R: float | None = None
-    density: float | None = None
-    max_error: float | None = None
-    calibrated: bool = False
-    left_right: bool = False
-    tolerance: float = 1.0
-    subpixel: bool = False
-    fill: bool = False
-    right_view: bool = False
-
-    def __post_init__(self) -> None:
-        """Refuse what contradicts itself."""
-        given = [name for name in ("R", "density", "max_error") if getattr(self, name) is not None]
-        if len(given) > 1:
-            raise UsageError(f"{' and '.join(given)} both say how much to keep; give one of them")
-
-    @property
-    def product(self) -> str:
-        """The product that the wishes come down to."""
-        return "filled" if self.fill else "refined" if self.left_right or self.subpixel else "semidense"
-
-    @property
-    def confidence(self) -> str:
-        """The product that the confidence is taken from."""
-        return "calibrated_confidence" if self.calibrated else "confidence"
-
-    @property
-    def settings(self) -> tuple[str, ...]:
-        """The same as settings of the configuration."""
-        given = {f"semidense.{name}": getattr(self, name) for name in ("R", "density", "max_error")}
-        if self.calibrated:
-            given |= {"semidense.calibrated": True}
-        if self.left_right:
-            given |= {"refined.left_right": True, "refined.tolerance": self.tolerance}
-        if self.subpixel:
-            given |= {"refined.subpixel": True}
-        return tuple(f"{name}={str(value).lower()}" for name, value in given.items() if value is not None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.pipeline.api import Task
-from semidense.pipeline.pairs.match import Wishes, match, wished
-from semidense.pipeline.plan.config import Settings, nearest, setting_texts
-from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.pairs.match import match, wished
+from semidense.pipeline.pairs.wishes import Wishes
+from semidense.pipeline.plan.config import Settings, setting_texts
+from semidense.pipeline.plan.errors import UsageError, nearest
 from semidense.pipeline.plan.presets import OWN_PAIRS
 
 _WISHES = tuple(field.name for field in fields(Wishes))

@@ -14,9 +14,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from semidense.datasets import SceneSource
-from semidense.pipeline.plan.config import Config, nearest, one_line
+from semidense.pipeline.plan.config import Config, one_line
 from semidense.pipeline.plan.environment import environment
-from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.errors import UsageError, nearest
 from semidense.pipeline.plan.images_and_truth import Source, source_of
 from semidense.pipeline.plan.shipped_weights import Weights, weights_of, weights_stage
 from semidense.pipeline.plan.steps import (

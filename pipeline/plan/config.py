@@ -4,7 +4,6 @@ The sections are those of the stages' own ``Params``, of stages from other packa
 defaults, a preset, a TOML file, ``section.field=value`` settings.
 """
 
-import difflib
 import json
 import re
 import tomllib
@@ -16,7 +15,7 @@ from typing import Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from semidense.pipeline.plan import presets
-from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.errors import UsageError, nearest, shortened
 from semidense.stages.catalog import STAGES
 from semidense.stages.stage import NoParams, Params
 
@@ -32,8 +31,6 @@ CHOICES = ("weights", "use")
 
 LONGEST_FILE = 1 << 20
 """Bytes of a configuration; no real one comes near."""
-LONGEST_VALUE = 200
-"""Characters of a value that a message repeats."""
 
 
 class TrainingParams(Params):
@@ -284,25 +281,9 @@ def _refuse_unknown(tree: Mapping[str, Any], model: type[Config]) -> None:
                 raise UsageError(f"configuration: {section} has no setting {field!r}; {hint}")
 
 
-def nearest(name: str, known: Iterable[str], prefix: str = "") -> str:
-    """Return a hint: the nearest known name, or all of them if none is near."""
-    names = list(known)
-    folded = {item.lower(): item for item in names}
-    near = difflib.get_close_matches(name.lower(), folded, n=1, cutoff=0.5)
-    if near:
-        return f"did you mean {prefix}{folded[near[0]]}?"
-    return f"there are {', '.join(prefix + item for item in names)}" if names else "it has no settings"
-
-
 def one_line(error: ValidationError) -> str:
     """Return one line for the first thing that is wrong with a configuration."""
     first = error.errors(include_url=False)[0]
     name = ".".join(str(part) for part in first["loc"])
     more = f" ({error.error_count() - 1} more)" if error.error_count() > 1 else ""
     return f"configuration: {name} = {shortened(first['input'])}: {first['msg']}{more}"
-
-
-def shortened(value: object) -> str:
-    """Return a value as a message repeats it, the start of a very long one."""
-    text = repr(value)
-    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}… ({len(text):,} characters)"

@@ -1,6 +1,8 @@
 """What can go wrong in a run: what the user can mend is one line, the rest keeps its cause."""
 
+import difflib
 import errno
+from collections.abc import Iterable
 
 from semidense.cache import CacheError
 from semidense.datasets import DatasetError
@@ -23,6 +25,8 @@ class StageRefused(UsageError):  # noqa: N818
     """A stage refused what it was given; the message names product, scene, tile and reason."""
 
 
+LONGEST_VALUE = 200
+"""Characters of a value that a message repeats."""
 USER_ERRORS = (UsageError, DatasetError, CacheError, StageError)
 """Errors that one line explains: the command line prints it and exits with 2."""
 
@@ -59,3 +63,19 @@ def _lacks_memory(error: BaseException | None) -> bool:
             return True
         error = error.__cause__ or error.__context__
     return False
+
+
+def nearest(name: str, known: Iterable[str], prefix: str = "") -> str:
+    """Return a hint: the nearest known name, or all of them if none is near."""
+    names = list(known)
+    folded = {item.lower(): item for item in names}
+    near = difflib.get_close_matches(name.lower(), folded, n=1, cutoff=0.5)
+    if near:
+        return f"did you mean {prefix}{folded[near[0]]}?"
+    return f"there are {', '.join(prefix + item for item in names)}" if names else "it has no settings"
+
+
+def shortened(value: object) -> str:
+    """Return a value as a message repeats it, the start of a very long one."""
+    text = repr(value)
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}… ({len(text):,} characters)"

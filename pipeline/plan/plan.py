@@ -16,9 +16,8 @@ from semidense.cache import ABSENT, Change, Entry, Recipe, Store, differences
 from semidense.datasets import Dataset, DisparityRange, SceneSource
 from semidense.pipeline.plan.building import build
 from semidense.pipeline.plan.causes import PENDING, Causes
-from semidense.pipeline.plan.config import nearest
 from semidense.pipeline.plan.environment import former_version, version
-from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.errors import UsageError, nearest
 from semidense.pipeline.plan.steps import Graph, Request, Step, needs_range, products
 
 COMPARED = 50

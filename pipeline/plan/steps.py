@@ -10,8 +10,8 @@ from typing import Any
 
 from semidense.cache import Recipe, code_parts
 from semidense.datasets import Dataset, SceneSource
-from semidense.pipeline.plan.config import Config, nearest
-from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.config import Config
+from semidense.pipeline.plan.errors import UsageError, nearest
 from semidense.pipeline.plan.shipped_weights import Weights
 from semidense.stages.catalog import READ, STAGES
 from semidense.stages.stage import NoParams, Params, Stage

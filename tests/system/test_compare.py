@@ -13,8 +13,9 @@ from semidense.datasets import open_dataset
 from semidense.pipeline import compare
 from semidense.pipeline.api import Task
 from semidense.pipeline.comparison.ablation import ABLATION
-from semidense.pipeline.comparison.experiments import BESIDE, EXPERIMENTS, LOWERED, MATCHERS, MEASURES, Comparison
+from semidense.pipeline.comparison.experiments import BESIDE, EXPERIMENTS, Comparison
 from semidense.pipeline.comparison.files import COLUMNS, write_comparison
+from semidense.pipeline.comparison.methods import LOWERED, MATCHERS, MEASURES
 from semidense.pipeline.comparison.paper_figures import NAMED, QUOTED
 from semidense.pipeline.comparison.protocols import protocol_requests
 from semidense.pipeline.comparison.tables import print_comparison

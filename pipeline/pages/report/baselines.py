@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 from semidense.cache import Entry, Recipe, Store
-from semidense.pipeline.comparison.experiments import MATCHERS, MEASURES, matcher_rows, measure_rows
+from semidense.pipeline.comparison.methods import MATCHERS, MEASURES, matcher_rows, measure_rows
 from semidense.pipeline.comparison.rows import Judged, Row
 from semidense.pipeline.plan.environment import missing_packages
 from semidense.pipeline.plan.plan import Planned, close_ranges, make_plan

@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from semidense.pipeline.comparison.ablation import ABLATION
-from semidense.pipeline.comparison.experiments import LOWERED, MATCHERS
+from semidense.pipeline.comparison.methods import LOWERED, MATCHERS
 from semidense.pipeline.comparison.tables import _by_scene, _fitted
 from semidense.pipeline.results.metric_rows import METHOD
 

@@ -16,8 +16,9 @@ from plyfile import PlyData
 from semidense import pipeline
 from semidense.datasets import DatasetError, open_dataset, read_pfm, read_png16
 from semidense.pipeline.api import Task, run, status
-from semidense.pipeline.pairs.match import Match, Wishes, match, match_all
+from semidense.pipeline.pairs.match import Match, match, match_all
 from semidense.pipeline.pairs.match_files import save, save_all
+from semidense.pipeline.pairs.wishes import Wishes
 from semidense.pipeline.plan.errors import UsageError
 from semidense.stages.stage import StageError
 

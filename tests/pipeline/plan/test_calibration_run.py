@@ -14,7 +14,8 @@ from semidense.pipeline.files.run_files import export
 from semidense.pipeline.files.selection import lineage
 from semidense.pipeline.pages.report.gathered import gather
 from semidense.pipeline.pages.report.graph import graph
-from semidense.pipeline.pairs.match import Wishes, match, match_all
+from semidense.pipeline.pairs.match import match, match_all
+from semidense.pipeline.pairs.wishes import Wishes
 from semidense.pipeline.plan import shipped_weights as shipped
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.result import Result

@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from semidense.pipeline.plan.config import CHOICES, Config, nearest, parse_setting, parse_value
-from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.config import CHOICES, Config, parse_setting, parse_value
+from semidense.pipeline.plan.errors import UsageError, nearest
 from semidense.pipeline.plan.steps import products
 from semidense.stages.catalog import CATALOG
 from semidense.stages.stage import NoParams, Stage
