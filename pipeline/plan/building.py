@@ -128,8 +128,18 @@ class _Builder:
         if "channels" in stage.inputs:
             require_trainable(self.config, product)
         needed = getattr(params, "inputs", stage.inputs)
+        if scene and "calibration" in needed and source_of("costvolume", scene):
+            self._require_own_calibration(scene)
         inputs = {name: self._inputs(stage, name, scene) for name in stage.inputs if name in needed}
         return self._add_stage(stage, params, scene, inputs)
+
+    def _require_own_calibration(self, scene: SceneSource) -> None:
+        """Refuse a calibration of our costs for those of another matcher: it says nothing about them."""
+        if not self.config.choice("weights", "calibration"):
+            raise UsageError(
+                f"{scene.name}: its costs come from a file, and no calibration of maps of such costs is known; "
+                "give R or a density instead, or a calibration of your own (weights.calibration=FILE)"
+            )
 
     def _weights(self, product: str) -> Weights | None:
         """Return the file that stands in for learning a product; None if it is learnt."""

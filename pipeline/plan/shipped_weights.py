@@ -14,7 +14,7 @@ from semidense.stages.stage import Array, Inputs, Stage, StageError
 
 _LEARNT_FROM_MAPS = ("evaluation_net", "calibration")
 """Products of which those for guided volumes are others: the errors of such maps hang together."""
-_CALIBRATED = ("confidence", "disparity")
+_CALIBRATED = ("confidence", "disparity", "costvolume")
 """Products that a calibration is about: it is of no use for those that other stages make."""
 
 
@@ -65,14 +65,18 @@ def weights_of(config: Config, product: str) -> Weights:
 
 
 def shipped_weights(
-    product: str, mode: Mode, confidence: str = _CALIBRATED[0], disparity: str = _CALIBRATED[1]
+    product: str,
+    mode: Mode,
+    confidence: str = _CALIBRATED[0],
+    disparity: str = _CALIBRATED[1],
+    costvolume: str = _CALIBRATED[2],
 ) -> Weights:
-    """Return the package's weights of a product, for volumes of a mode and what makes the confidence and the map.
+    """Return the package's weights of a product, for volumes of a mode and what makes confidence, map and costs.
 
     Raises:
         StageError: if this installation has none.
     """
-    name = weights_name(product, mode, confidence, disparity)
+    name = weights_name(product, mode, confidence, disparity, costvolume)
     return Weights(product, name, None, weights_digest(name))
 
 
@@ -92,8 +96,14 @@ def _bytes_of(product: str, file: Path) -> bytes:
         raise StageError(f"weights.{product} = {file}: {error.strerror or error}") from None
 
 
-def weights_name(product: str, mode: Mode, confidence: str = _CALIBRATED[0], disparity: str = _CALIBRATED[1]) -> str:
-    """Return the name of a product's shipped weights, for volumes of a mode and what makes the confidence and the map.
+def weights_name(
+    product: str,
+    mode: Mode,
+    confidence: str = _CALIBRATED[0],
+    disparity: str = _CALIBRATED[1],
+    costvolume: str = _CALIBRATED[2],
+) -> str:
+    """Return the name of a product's shipped weights, for volumes of a mode and what makes confidence, map and costs.
 
     A calibration tells how often one kind of map is right at one kind of confidence, and nothing about other kinds.
 
@@ -102,7 +112,7 @@ def weights_name(product: str, mode: Mode, confidence: str = _CALIBRATED[0], dis
     >>> weights_name("calibration", "fast", "evidence_confidence", "aggregated")
     'calibration.evidence_confidence.aggregated'
     """
-    others = [name for name in (confidence, disparity) if name not in _CALIBRATED]
+    others = [name for name in (confidence, disparity, costvolume) if name not in _CALIBRATED]
     if product == "calibration" and others:
         return ".".join((product, *others))
     return f"{product}.guided" if mode == "guided" and product in _LEARNT_FROM_MAPS else product

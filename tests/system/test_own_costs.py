@@ -9,6 +9,7 @@ from PIL import Image
 from semidense.datasets import DatasetError
 from semidense.pipeline import api
 from semidense.pipeline.api import Task
+from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.images_and_truth import COSTS
 from semidense.stages.matching.declaration import COST_VOLUME
 
@@ -78,3 +79,10 @@ def test_both_kinds_of_volume_are_declared_alike() -> None:
     assert [(each.name, each.dims, each.dtype) for each in COSTS.outputs] == [
         (each.name, each.dims, each.dtype) for each in COST_VOLUME.outputs
     ]
+
+
+def test_a_wanted_error_needs_a_calibration_of_such_costs(pair: Path) -> None:
+    """The shipped one is about maps of our own costs: it would promise what nobody has measured."""
+    task = Task(spec(pair), settings=(*FAST, "semidense.max_error=0.05"), cache=pair / "cache")
+    with pytest.raises(UsageError, match=r"costs come from a file.*weights\.calibration=FILE"):
+        api.run(task, "semidense")
