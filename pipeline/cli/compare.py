@@ -88,7 +88,7 @@ def compare(
         raise UsageError(f"--threshold {threshold:g}: figures are worked out for {offered} px")
     task = api.Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, preset)
     experiments = experiment or comparison.EXPERIMENTS
-    with ProgressWatch() as watch:
+    with ProgressWatch(console.announce) as watch:
         found = comparison.compare(
             task,
             experiments,

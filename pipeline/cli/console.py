@@ -8,11 +8,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from semidense.cache import Change
+from semidense.cache import Change, Store
 from semidense.cache.keys.recipe import short
 from semidense.pipeline.execution.scheduler import totals
 from semidense.pipeline.plan.causes import PENDING
 from semidense.pipeline.plan.plan import Made, Plan, Planned
+from semidense.pipeline.results.estimate import Estimate, estimate
 from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, averaged, with_means
 from semidense.pipeline.results.text import results
 from semidense.stages.metrics.stage import ROW
@@ -50,8 +51,8 @@ def _change_row(change: Change) -> dict[str, Any]:
     return {"field": change.field, "old": change.old, "new": change.new}
 
 
-def print_plan(plan: Plan) -> None:
-    """Print a line a product and scene: its state, its key, and why it is not a hit."""
+def print_plan(plan: Plan, time: Estimate) -> None:
+    """Print a line a product and scene: its state, its key, and why it is not a hit; then how long a run takes."""
     table = Table("product", "scene", "state", "key", "why", box=None, pad_edge=False)
     tellers: dict[str, str] = {}
     for planned in plan.steps:
@@ -67,6 +68,19 @@ def print_plan(plan: Plan) -> None:
     hits = len(plan.steps) - len(plan.todo())
     making = ", ".join(f"{count} {product}" for product, count in todo.items()) or "nothing"
     console.print(f"reuses {hits} products, makes {making}", highlight=False)
+    if todo:
+        console.print(f"time: {time}", highlight=False)
+
+
+LONG = 10.0
+"""Seconds from which a run says beforehand how long it will take."""
+
+
+def announce(plan: Plan, store: Store) -> None:
+    """Print on stderr how long a run will take, if that is over 10 s."""
+    expected = estimate(plan, store)
+    if expected.known > LONG:
+        Console(stderr=True, soft_wrap=True).print(f"time: {expected}", highlight=False, markup=False)
 
 
 def why(planned: Planned, tellers: dict[str, str] | None = None) -> str:

@@ -155,12 +155,14 @@ def _plan(task: "Task", wishes: "Wishes", as_json: bool) -> None:
 
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
+    from semidense.pipeline.results.estimate import estimate
 
     plan = api.status(replace(task, settings=(*task.settings, *wishes.settings)), wishes.product)
+    time = estimate(plan, api.open_store(task.cache))
     if as_json:
-        console.print_json({"steps": console.step_rows(plan, {})})
+        console.print_json({"steps": console.step_rows(plan, {}), "estimate_seconds": time.seconds})
     else:
-        console.print_plan(plan)
+        console.print_plan(plan, time)
 
 
 def _carry_out(
@@ -175,7 +177,7 @@ def _carry_out(
 
     task = replace(task, dataset=task.open())
     require_place(task.open().scenes, output, kinds)
-    with ProgressWatch() as watch:
+    with ProgressWatch(console.announce) as watch:
         found = match_all(task, wishes, watch=watch, **how)
     summaries = save_all(found, output, kinds)
     for each in found:

@@ -28,6 +28,7 @@ from semidense.pipeline.cli.options import (
 from semidense.pipeline.plan.presets import DEFAULT
 
 if TYPE_CHECKING:
+    from semidense.cache import Store
     from semidense.pipeline.api import Task
     from semidense.pipeline.plan.plan import Plan
     from semidense.pipeline.results.result import Result
@@ -63,8 +64,8 @@ def run(
 
     task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     if dry_run:
-        return _print_plan(api.status(task, upto, forced=force or ()), as_json)
-    with ProgressWatch() as watch:
+        return _print_plan(api.status(task, upto, forced=force or ()), api.open_store(cache), as_json)
+    with ProgressWatch(console.announce) as watch:
         result = api.run(task, upto, forced=force or (), watch=watch, scheduler=scheduler, workers=workers)
     files = _export(result, output)
     if as_json:
@@ -109,7 +110,7 @@ def sweep(
     from semidense.pipeline.files.run_files import write_sweep
 
     task = _task(dataset, scene, chosen(None, mode), config, train, cache, preset)
-    with ProgressWatch() as watch:
+    with ProgressWatch(console.announce) as watch:
         result = api.sweep(task, thresholds, settings or (), watch=watch, scheduler=scheduler, workers=workers)
     files = write_sweep(result.metrics, output)
     if as_json:
@@ -136,7 +137,8 @@ def status(
     """Print which products are cached, and why the others must be made."""
     from semidense.pipeline import api
 
-    _print_plan(api.status(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), upto), as_json)
+    plan = api.status(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), upto)
+    _print_plan(plan, api.open_store(cache), as_json)
 
 
 def explain(
@@ -221,13 +223,16 @@ def _task(
     return Task(dataset, tuple(scenes or ()), settings, config_file(config), train, cache, preset)
 
 
-def _print_plan(plan: "Plan", as_json: bool) -> None:
+def _print_plan(plan: "Plan", store: "Store", as_json: bool) -> None:
     from semidense.pipeline.cli import console
+    from semidense.pipeline.results.estimate import estimate
 
+    time = estimate(plan, store)
     if as_json:
-        console.print_json({"steps": console.step_rows(plan, {}), "metrics": []})
+        steps = console.step_rows(plan, {})
+        console.print_json({"steps": steps, "metrics": [], "estimate_seconds": time.seconds})
     else:
-        console.print_plan(plan)
+        console.print_plan(plan, time)
 
 
 def _print_result(result: "Result", files: list[Path]) -> None:

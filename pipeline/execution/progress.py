@@ -1,17 +1,17 @@
-"""Show how a run goes on: a bar a product on a terminal, a line now and then elsewhere; always on stderr."""
+"""Show how a run goes on: one bar on a terminal, a line now and then elsewhere; always on stderr."""
 
 import sys
 import threading
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
-from rich.text import Text
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from semidense.cache import Draft
-from semidense.pipeline.plan.plan import Made
+from semidense.cache import Draft, Store
+from semidense.pipeline.plan.plan import Made, Plan
 from semidense.pipeline.plan.steps import Step
 
 if TYPE_CHECKING:
@@ -21,51 +21,57 @@ LINE_SECONDS = 20.0
 """Where there is no terminal, a product that takes long says so at most this often."""
 
 
-class RateColumn(ProgressColumn):
-    """Steps or tiles a second."""
-
-    def render(self, task: Task) -> Text:
-        """Return the rate, once there is one."""
-        return Text(f"{task.speed:.2g}/s" if task.speed else "", style="dim")
-
-
 class ProgressWatch:
-    """A ``Watch`` for people. Use it as a context manager: the bars are gone at its end."""
+    """A ``Watch`` for people. Use it as a context manager: the bar is gone at its end.
 
-    def __init__(self) -> None:
+    Args:
+        announce: called with the plan and the cache before each run begins, such as to print how long it will take.
+    """
+
+    def __init__(self, announce: Callable[[Plan, Store], None] | None = None) -> None:
+        self._announce = announce
         self._console = Console(stderr=True)
-        self._bars = Progress(
+        self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
             MofNCompleteColumn(),
-            RateColumn(),
             TimeRemainingColumn(),
-            TextColumn("{task.fields[note]}", style="dim"),
+            TextColumn("{task.fields[note]}", style="dim", markup=False),
             console=self._console,
             transient=True,
             disable=not sys.stderr.isatty(),
         )
+        self._whole = self._bar.add_task("products", total=None, note="", visible=False)
+        self._finished = 0
         self._rows: dict[str, _Row] = {}
         self._lock = threading.Lock()
         self._compiling: Compiling | None = None
 
     def __enter__(self) -> Self:
-        self._bars.start()
+        self._bar.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._bars.stop()
+        self._bar.stop()
         if self._compiling:
             self._compiling.stop()
 
+    def planned(self, plan: Plan, store: Store) -> None:
+        """Begin the bar anew: one step for each product to make."""
+        if self._announce:
+            self._announce(plan, store)
+        with self._lock:
+            self._rows, self._finished = {}, 0
+            self._bar.reset(self._whole, total=len(plan.todo()), note="", visible=True)
+
     def begun(self, step: Step, draft: Draft, tiles: int) -> None:
-        """Add a bar."""
+        """Name the product beside the bar."""
         with self._lock:
             self._compiling = self._compiling or self._listen()
-            task = self._bars.add_task(step.name, total=tiles, note="")
-            self._rows[step.id] = _Row(int(task), time.monotonic())
+            self._rows[step.id] = _Row(step.name, time.monotonic(), tiles)
+            self._show()
 
     def _listen(self) -> "Compiling":
         from semidense.stages.compute.compiling import Compiling  # with Numba, which a run that makes nothing spares
@@ -87,24 +93,31 @@ class ProgressWatch:
             if step.stage.monitored and row.found is None:
                 row.found = done - 1
             row.done = done if step.stage.monitored else row.done + done
-            self._bars.update(row.task, completed=row.done, total=total, note=note)  # type: ignore[arg-type]
+            row.total, row.note = total, note
+            self._show()
             self._say(step, row, total, note)
 
+    def _show(self) -> None:
+        """Move the bar to what is made, parts of products included, and name the product that was begun last."""
+        rows = list(self._rows.values())
+        parts = sum(row.done / row.total for row in rows if row.total)
+        self._bar.update(self._whole, completed=self._finished + parts, note=str(rows[-1]) if rows else "")
+
     def _say(self, step: Step, row: "_Row", total: int, note: str) -> None:
-        """Print a line where there are no bars and there is something to wait for."""
+        """Print a line where there is no bar and there is something to wait for."""
         now = time.monotonic()
-        if self._bars.disable and row.done < total and now - row.said >= LINE_SECONDS:
+        if self._bar.disable and row.done < total and now - row.said >= LINE_SECONDS:
             row.said = now
             left = (now - row.started) / (row.done - (row.found or 0)) * (total - row.done)
             text = f"{step.name}: {row.done} of {total}, about {left:.0f} s left {note}"
             self._console.print(text.rstrip(), highlight=False, soft_wrap=True, markup=False)
 
     def published(self, made: Made) -> None:
-        """Turn the bar into a line, if the product took long enough to be worth one."""
+        """Count the product as made; print a line if that took a second or more."""
         with self._lock:
-            row = self._rows.pop(made.step.id, None)
-            if row is not None:
-                self._bars.remove_task(row.task)  # type: ignore[arg-type]
+            self._rows.pop(made.step.id, None)
+            self._finished += 1
+            self._show()
             if not made.reused and made.seconds >= 1.0:
                 self._console.print(
                     f"made {made.step.name} in {made.seconds:.1f} s", highlight=False, soft_wrap=True, markup=False
@@ -114,9 +127,14 @@ class ProgressWatch:
 class _Row:
     """One product in the making."""
 
-    def __init__(self, task: int, now: float) -> None:
-        self.task = task
+    def __init__(self, name: str, now: float, total: int) -> None:
+        self.name, self.total = name, total
         self.started = self.said = now
-        self.done = 0
+        self.done, self.note = 0, ""
         self.found: int | None = None
         """Steps of a training that a checkpoint had already: they took none of the time since."""
+
+    def __str__(self) -> str:
+        """Return the product, its tiles or training steps, and its note."""
+        parts = f" {self.done}/{self.total}" if self.total > 1 else ""
+        return f"{self.name}{parts} {self.note}".rstrip()

@@ -47,6 +47,7 @@ def execute(
     store.sweep_drafts()
     if not plan.todo():
         return {planned.step.id: _there(planned) for planned in plan.steps}
+    watch.planned(plan, store)
     with nullcontext(lease) if lease else store.lease() as held:
         if scheduler:
             context = Context(store, Unwatched(), extras, Claims(held), runner=runner_code())

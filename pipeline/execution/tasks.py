@@ -211,6 +211,7 @@ def _publish(draft: Draft, seconds: float, extras: Mapping[str, Any]) -> Entry:
 def _extras(context: Context, step: Step) -> dict[str, Any]:
     """Return what is stored beside a result: what the run gives to all, and what belongs to this one."""
     own: dict[str, Any] = {"cpu": cpu_name(), "configuration": step.configuration}
+    own |= {"image_size": list(step.size)} if step.size else {}
     return {**context.extras, **own, **({"run": run} if (run := context.claims.lease.name) else {})}
 
 

@@ -2,13 +2,16 @@
 
 from typing import Protocol
 
-from semidense.cache import Draft
-from semidense.pipeline.plan.plan import Made
+from semidense.cache import Draft, Store
+from semidense.pipeline.plan.plan import Made, Plan
 from semidense.pipeline.plan.steps import Step
 
 
 class Watch(Protocol):
     """What is told how a run goes on, from any thread."""
+
+    def planned(self, plan: Plan, store: Store) -> None:
+        """A run begins: it will make what the plan lacks."""
 
     def begun(self, step: Step, draft: Draft, tiles: int) -> None:
         """A product is being made in ``draft``, in so many tiles."""
@@ -25,6 +28,9 @@ class Watch(Protocol):
 
 class Unwatched:
     """A watch for workers in other processes: it sees nothing."""
+
+    def planned(self, plan: Plan, store: Store) -> None:
+        """See nothing."""
 
     def begun(self, step: Step, draft: Draft, tiles: int) -> None:
         """See nothing."""

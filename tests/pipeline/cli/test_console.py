@@ -8,6 +8,7 @@ from semidense.cache import ABSENT, Change
 from semidense.pipeline.cli import console
 from semidense.pipeline.plan.causes import PENDING
 from semidense.pipeline.plan.plan import Made, Plan, Planned
+from semidense.pipeline.results.estimate import Estimate
 from tests.pipeline.toy import RAMP, SUM, step
 
 KEY = "ab" * 32
@@ -75,25 +76,25 @@ def test_why_a_step_is_not_a_hit(planned: Planned, text: str) -> None:
 
 
 def test_a_plan_is_a_line_a_step_and_a_sum(capsys: pytest.CaptureFixture[str]) -> None:
-    console.print_plan(Plan((HIT, STALE, MISSING), (), ("one", "two")))
+    console.print_plan(Plan((HIT, STALE, MISSING), (), ("one", "two")), Estimate(170))
     out, err = capsys.readouterr()
     lines = [line.split() for line in out.splitlines()]
     assert lines[0] == ["product", "scene", "state", "key", "why"]
     assert lines[1] == ["ramp", "Toy", "hit", KEY[:12]]
     assert lines[2] == ["ramp", "Toy", "stale", KEY[:12], "params.window:", "31", "->", "15"]
     assert lines[3][:3] == ["sum", "Toy", "missing"]
-    assert out.splitlines()[-1] == "reuses 1 products, makes 1 ramp, 1 sum"
+    assert out.splitlines()[-2:] == ["reuses 1 products, makes 1 ramp, 1 sum", "time: about 3 min"]
     assert err.splitlines() == ["note: one", "note: two"]
 
 
 def test_where_all_is_there_nothing_is_made(capsys: pytest.CaptureFixture[str]) -> None:
-    console.print_plan(Plan((HIT,), ()))
+    console.print_plan(Plan((HIT,), ()), Estimate(170))
     assert capsys.readouterr().out.splitlines()[-1] == "reuses 1 products, makes nothing"
 
 
 def test_names_are_text_not_markup(capsys: pytest.CaptureFixture[str]) -> None:
     odd = replace(STEP, scene="[red]x[/y]")
-    console.print_plan(Plan((replace(HIT, step=odd),), (), ("[/z] left out",)))
+    console.print_plan(Plan((replace(HIT, step=odd),), (), ("[/z] left out",)), Estimate(170))
     console.print_metrics([ROW | {"scene": "[red]x[/y]"}], {})
     out, err = capsys.readouterr()
     assert out.count("[red]x[/y]") == 2

@@ -89,9 +89,10 @@ def test_a_plan_is_printed_and_nothing_made(invoke: Invoke, there: list[str], ho
     lines = [line.split() for line in ran.out.splitlines()]
     assert lines[0] == ["product", "scene", "state", "key", "why"]
     assert [line[4:] for line in lines if line[0] == "channels"] == [["channels.rank_window:", "31", "->", "15"]] * 3
-    assert lines[-1][:3] == ["reuses", "8", "products,"]
+    assert lines[-2][:3] == ["reuses", "8", "products,"]
+    assert lines[-1][0] == "time:"
     found = only_object(invoke(*how, *there, "--set", "channels.rank_window=15", "--json").out)
-    assert set(found) == {"steps", "metrics"}
+    assert set(found) == {"steps", "metrics", "estimate_seconds"}
     assert [list(row) for row in found["steps"]] == [STEP_KEYS] * 27
     assert {path.stat().st_mtime_ns for path in trained.store.root.rglob("*")} == before
 

@@ -9,10 +9,11 @@ from rich.console import Console
 
 from semidense.pipeline.execution import progress
 from semidense.pipeline.execution.progress import ProgressWatch
-from semidense.pipeline.plan.plan import Made
+from semidense.pipeline.plan.plan import Made, Plan, Planned
 from tests.pipeline.toy import RAMP, SUM, step
 
 NO_DRAFT: Any = None
+NO_STORE: Any = None
 TILED, TRAINED = step(RAMP, 0), step(replace(SUM, monitored=True))
 
 
@@ -96,21 +97,49 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_on_a_terminal_there_is_a_bar_with_a_rate_and_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+PLAN = Plan((Planned(TILED, "missing"), Planned(TRAINED, "missing")), ())
+
+
+def test_on_a_terminal_there_is_one_bar_for_the_whole_run(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
     monkeypatch.setenv("TERM", "xterm")
     watch = ProgressWatch()
-    watch._console = watch._bars.live.console = Console(file=terminal, force_terminal=True, width=120)
+    watch._console = watch._bar.live.console = Console(file=terminal, force_terminal=True, width=120)
     with watch:
+        watch.planned(PLAN, NO_STORE)
+        watch.begun(TILED, NO_DRAFT, 2)
+        watch.published(Made(TILED, "k", "d", 0.5, False))
         watch.begun(TRAINED, NO_DRAFT, 1)
-        for done in (1, 2, 3):
-            watch.advanced(TRAINED, done, 10, "loss 0.25")
-        watch._bars.refresh()
+        watch.advanced(TRAINED, 3, 10, "loss 0.25")
+        watch._bar.refresh()
+        (whole,) = watch._bar.tasks
         watch.published(Made(TRAINED, "k", "d", 2.0, False))
     shown = terminal.getvalue()
-    assert "sum of Toy" in shown
-    assert "3/10" in shown
-    assert "/s" in shown
-    assert "loss 0.25" in shown
+    assert "1/2" in shown
+    assert "sum of Toy 3/10 loss 0.25" in shown
     assert "made sum of Toy in 2.0 s" in shown
+    assert (whole.completed, whole.total) == (2, 2)
+
+
+def test_parts_of_a_product_move_the_bar() -> None:
+    with ProgressWatch() as watch:
+        watch.planned(PLAN, NO_STORE)
+        watch.begun(TILED, NO_DRAFT, 4)
+        watch.advanced(TILED, 1, 4, "")
+        assert watch._bar.tasks[0].completed == 0.25
+
+
+def test_a_run_that_plans_again_begins_its_bar_anew() -> None:
+    with ProgressWatch() as watch:
+        watch.planned(PLAN, NO_STORE)
+        watch.published(Made(TILED, "k", "d", 0.5, False))
+        watch.planned(Plan(PLAN.steps[1:], ()), NO_STORE)
+        assert (watch._bar.tasks[0].completed, watch._bar.tasks[0].total) == (0, 1)
+
+
+def test_a_run_is_announced_before_it_begins() -> None:
+    told: list[Plan] = []
+    with ProgressWatch(lambda plan, _: told.append(plan)) as watch:
+        watch.planned(PLAN, NO_STORE)
+    assert told == [PLAN]

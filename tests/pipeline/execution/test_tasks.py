@@ -61,7 +61,9 @@ def test_a_product_is_begun_made_and_published(context: Context, seen: Seen) -> 
     assert seen.told == [("begun", "ramp", 1), ("advanced", "ramp", 1, 1, ""), ("published", "ramp", False)]
     entry = context.store.require(made.key)
     assert entry.label == {"product": "ramp", "dataset": "toys", "scene": "Toy"}
-    assert dict(entry.extras) == {"by": "test", "cpu": cpu_name(), "configuration": {}}
+    assert dict(entry.extras) == {
+        "by": "test", "cpu": cpu_name(), "configuration": {}, "image_size": [10, 4],
+    }  # fmt: skip
 
 
 def test_what_is_there_gives_a_finished_job(context: Context, seen: Seen) -> None:

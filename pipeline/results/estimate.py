@@ -1,0 +1,135 @@
+"""Estimate how long a plan will take, from how long this machine took for results in the cache."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import prod
+from typing import Any
+
+from semidense.cache import Entry, Store
+from semidense.cache.entries.index import Index, inputs_of
+from semidense.pipeline.plan.environment import cpu_name
+from semidense.pipeline.plan.plan import Plan
+from semidense.pipeline.plan.steps import Step
+from semidense.stages.catalog import READ
+
+_RANGE = ("d_min", "d_max")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """How long a plan will take.
+
+    Attributes:
+        known: seconds for the products that have a measured time.
+        unknown: products to make without one: nothing like them was made on this machine.
+    """
+
+    known: float = 0.0
+    unknown: tuple[str, ...] = ()
+
+    @property
+    def seconds(self) -> float | None:
+        """The time for all products in seconds; None if one of them is unknown."""
+        return None if self.unknown else self.known
+
+    def __str__(self) -> str:
+        """Return the time in words, and which products it leaves out."""
+        if not self.unknown:
+            return duration(self.known)
+        reason = "nothing like it was made here yet"
+        if self.known < 1:
+            return f"unknown: {reason}"
+        return f"{duration(self.known)}, and an unknown time for {', '.join(self.unknown)}: {reason}"
+
+
+def duration(seconds: float) -> str:
+    """Return a time that is not exact, in words.
+
+    >>> duration(0.4), duration(43), duration(170), duration(9000)
+    ('less than 1 s', 'about 43 s', 'about 3 min', 'about 2.5 h')
+    """
+    if seconds < 1:
+        return "less than 1 s"
+    for unit, length, most in (("s", 1, 90), ("min", 60, 90)):
+        if seconds / length < most:
+            return f"about {seconds / length:.0f} {unit}"
+    return f"about {seconds / 3600:.1f} h"
+
+
+def estimate(plan: Plan, store: Store) -> Estimate:
+    """Return how long the products of a plan that are not cached will take.
+
+    A product of a scene takes the time of a cached one of the same product and mode, times the ratio of pixels x
+    disparities. A product of the training split takes the time of one with equal settings. Reading files is not
+    counted. What other products make at the same time is not subtracted.
+    """
+    todo = [planned.step for planned in plan.todo() if planned.step.product not in READ]
+    if not todo:
+        return Estimate()
+    measured, disparities = _Measured(store.entries()), _planned_disparities(plan)
+    times = [(step.product, measured.seconds(step, disparities[step.id])) for step in todo]
+    unknown = dict.fromkeys(product for product, seconds in times if seconds is None)
+    return Estimate(sum(seconds or 0.0 for _, seconds in times), tuple(unknown))
+
+
+class _Measured:
+    """The times of the entries that this machine made."""
+
+    def __init__(self, entries: Iterable[Entry]) -> None:
+        all_entries = sorted(entries, key=lambda entry: entry.created, reverse=True)
+        self._index = Index(all_entries)
+        self._entries: dict[str, list[Entry]] = {}
+        self._disparities: dict[str, int] = {}
+        for entry in all_entries:
+            if entry.extras.get("cpu") == cpu_name():
+                self._entries.setdefault(entry.recipe.stage, []).append(entry)
+
+    def seconds(self, step: Step, disparities: int) -> float | None:
+        """Return how long a step takes by the entry nearest to it in settings, the newest of equals; None without."""
+        alike = [entry for entry in self._entries.get(step.product, ()) if _alike(entry, step)]
+        if not alike:
+            return None
+        nearest = min(alike, key=lambda entry: len(_differing(entry, step)))
+        if step.size is None:
+            return nearest.seconds
+        return nearest.seconds * prod(step.size) * disparities / (_pixels(nearest) * self._searched(nearest))
+
+    def _searched(self, entry: Entry) -> int:
+        """Return how many disparities were searched for an entry or for what it was made from; 1 for neither."""
+        if entry.key not in self._disparities:
+            self._disparities[entry.key] = 1  # before its inputs': a hostile record may name itself
+            pairs = [(product, each) for product, all_ in inputs_of(entry.recipe).items() for each in all_]
+            above = [found for product, each in pairs if (found := self._index.find(product, each))]
+            self._disparities[entry.key] = _count(entry.recipe.params) or max(map(self._searched, above), default=1)
+        return self._disparities[entry.key]
+
+
+def _planned_disparities(plan: Plan) -> dict[str, int]:
+    """Return how many disparities are searched for each step or for what it is made from; 1 for neither."""
+    found: dict[str, int] = {}
+    for step in (planned.step for planned in plan.steps):
+        above = (found[each] for ids in step.inputs.values() for each in ids)
+        found[step.id] = _count(step.settings) or max(above, default=1)
+    return found
+
+
+def _count(settings: Mapping[str, Any]) -> int | None:
+    low, high = (settings.get(name) for name in _RANGE)
+    return high - low + 1 if isinstance(low, int) and isinstance(high, int) else None
+
+
+def _alike(entry: Entry, step: Step) -> bool:
+    if step.size is None:
+        return not _differing(entry, step)
+    return _pixels(entry) > 0 and entry.recipe.params.get("mode") == step.settings.get("mode")
+
+
+def _differing(entry: Entry, step: Step) -> list[str]:
+    """Return the settings in which an entry and a step differ, except for the range of disparities."""
+    old, new = entry.recipe.params, step.settings
+    return [name for name in {*old, *new} - {*_RANGE} if old.get(name) != new.get(name)]
+
+
+def _pixels(entry: Entry) -> int:
+    """Return the pixels of an entry's image; 0 where they were not recorded."""
+    return prod(entry.extras.get("image_size") or (0,))
