@@ -7,7 +7,9 @@ from typing import Any
 from rich.console import Console
 
 from semidense.cache import Entry, Store
+from semidense.pipeline.api import Task
 from semidense.pipeline.cli.console import why
+from semidense.pipeline.files.suggestion import run_command
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Planned
 from semidense.pipeline.results.provenance import ancestry, tree_lines
@@ -41,7 +43,7 @@ def explanation(planned: Planned, store: Store) -> dict[str, Any]:
     )
 
 
-def draw_provenance(planned: Planned, store: Store, path: Path) -> None:
+def draw_provenance(planned: Planned, store: Store, path: Path, task: Task) -> None:
     """Draw what a product was made from.
 
     Raises:
@@ -49,7 +51,7 @@ def draw_provenance(planned: Planned, store: Store, path: Path) -> None:
     """
     if planned.state != "hit" or planned.key is None:
         name, product = planned.step.name, planned.step.product
-        raise UsageError(f"{name} is not cached ({why(planned)}): make it with `pipeline run --upto {product}`")
+        raise UsageError(f"{name} is not cached ({why(planned)}): make it with `{run_command(task, product)}`")
     from semidense.pipeline.figures.provenance import save_graph
 
     save_graph(ancestry(store, planned.key), path)

@@ -8,7 +8,9 @@ from rich.console import Console
 from rich.table import Table
 
 from semidense.cache import Store
+from semidense.pipeline.api import Task
 from semidense.pipeline.cli.console import print_json, why
+from semidense.pipeline.files.suggestion import run_command
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Planned
 from semidense.pipeline.results.opening import open_product
@@ -27,7 +29,7 @@ class Inspection:
     store: Store
 
 
-def inspection(planned: Planned, store: Store) -> Inspection:
+def inspection(planned: Planned, store: Store, task: Task) -> Inspection:
     """Open a product for looking at it.
 
     Raises:
@@ -36,7 +38,7 @@ def inspection(planned: Planned, store: Store) -> Inspection:
     step = planned.step
     if planned.state != "hit" or planned.key is None:
         raise UsageError(
-            f"{step.name} is not cached ({why(planned)}): make it with `pipeline run --upto {step.product}`"
+            f"{step.name} is not cached ({why(planned)}): make it with `{run_command(task, step.product)}`"
         )
     return Inspection(planned, open_product(store, planned.key), store)
 

@@ -165,11 +165,12 @@ def explain(
     from semidense.pipeline.cli.explain import draw_provenance, explanation, print_explanation
     from semidense.pipeline.plan.config import preset_settings
 
-    planned = api.explain(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), product)
+    task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
+    planned = api.explain(task, product)
     found = explanation(planned, api.open_store(cache))
     found |= {"preset": {"name": preset, "settings": list(preset_settings(preset))}}
     if graph:
-        draw_provenance(planned, api.open_store(cache), graph)
+        draw_provenance(planned, api.open_store(cache), graph, task)
     if as_json:
         from semidense.pipeline.cli.console import print_json
 
@@ -202,8 +203,9 @@ def inspect(
     from semidense.pipeline import api
     from semidense.pipeline.cli.inspect import draw, inspection, print_inspection
 
-    planned = api.explain(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), product)
-    found = inspection(planned, api.open_store(cache))
+    task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
+    planned = api.explain(task, product)
+    found = inspection(planned, api.open_store(cache), task)
     if png:
         draw(found, png, pixel, disparity)
     print_inspection(found, png, as_json)

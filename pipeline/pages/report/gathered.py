@@ -7,6 +7,7 @@ from typing import Any
 
 from semidense.cache import Entry, Store
 from semidense.pipeline.api import Task, open_store, status
+from semidense.pipeline.files.suggestion import run_command
 from semidense.pipeline.pages.report.baselines import cached_baselines, compared_rows
 from semidense.pipeline.pages.scene_maps import SceneMaps
 from semidense.pipeline.plan.errors import UsageError
@@ -120,8 +121,6 @@ def gather(task: Task) -> Gathered:
             name = by_id[target].step.scene
             scenes.append(GatheredScene(name, steps, store, baselines.get(name, {})))
     if not scenes:
-        raise UsageError(
-            f"nothing of {task.dataset} is cached in {store.root}: make it with `pipeline run {task.dataset}`"
-        )
+        raise UsageError(f"nothing of {task.dataset} is cached in {store.root}: make it with `{run_command(task)}`")
     config = next(iter(request.configs.values()))
     return Gathered(task, plan, store, tuple(scenes), config.of("semidense", SemidenseParams).R)

@@ -12,13 +12,13 @@ from semidense.pipeline.results.result import Result
 
 @pytest.fixture
 def costs(trained: Result, trained_task: Task) -> Inspection:
-    return inspection(explain(trained_task, "costvolume"), trained.store)
+    return inspection(explain(trained_task, "costvolume"), trained.store, trained_task)
 
 
 def test_a_product_that_is_not_cached_comes_with_the_command_that_makes_it(tmp_path: Path) -> None:
     task = Task("synthetic:train=0,test=1", cache=tmp_path)
     with pytest.raises(UsageError, match=r"images of test-0 is not cached \(never made\): .*--upto images"):
-        inspection(explain(task, "images"), open_store(tmp_path))
+        inspection(explain(task, "images"), open_store(tmp_path), task)
 
 
 def test_statistics_leave_nan_out_and_count_it() -> None:
