@@ -15,10 +15,12 @@ from semidense.pipeline.plan.causes import PENDING
 from semidense.pipeline.plan.plan import Made, Plan, Planned
 from semidense.pipeline.results.estimate import Estimate, estimate
 from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, averaged, with_means
-from semidense.pipeline.results.text import results
+from semidense.pipeline.results.text import print_table, results
 from semidense.stages.metrics.stage import ROW
 
 _COLUMNS = (*ROW, "pixels")
+_SPARE = tuple(FIGURES[name].head for name in ("pixels", "auc_optimal", "rms", "avgerr", "auc", "raw_bad"))
+"""Columns of the metrics that a narrow terminal does without, the least important first."""
 STYLES = {"hit": "green", "made": "cyan", "stale": "yellow", "missing": "dim"}
 
 
@@ -152,7 +154,7 @@ def _print_rows(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -> 
     for row in rows:
         table.add_row(*_cells(row), *([escape(_swept(row))] if swept else []))
     console = results()
-    console.print(table)
+    print_table(table, console, _SPARE)
     kinds = ", ".join(sorted(set(masks.values())))
     console.print(
         f"mask: nonocc ({kinds}); bad and errors are of reported pixels, raw bad counts unreported ones as wrong; "

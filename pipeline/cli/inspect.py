@@ -14,7 +14,7 @@ from semidense.pipeline.files.suggestion import run_command
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Planned
 from semidense.pipeline.results.opening import open_product
-from semidense.pipeline.results.text import opening_text
+from semidense.pipeline.results.text import opening_text, print_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -123,7 +123,7 @@ def print_inspection(found: Inspection, png: Path | None, as_json: bool) -> None
         table.add_row(row["name"], row["dims"], row["dtype"], *figures, none, row["units"])
     for column in table.columns[3:7]:
         column.justify = "right"
-    console.print(table)
+    print_table(table, console, ("dims", "unit", "dtype"))
     _draw_in_terminal(found)
     if png:
         console.print(f"wrote {png}", markup=False)

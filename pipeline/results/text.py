@@ -1,8 +1,10 @@
 """Values as short texts for people, and the console that results are printed on."""
 
 import json
+from collections.abc import Sequence
 
 from rich.console import Console
+from rich.table import Table
 
 from semidense.cache.keys.recipe import short
 
@@ -47,3 +49,38 @@ def opening_text(folder: object, key: str) -> str:
 def results() -> Console:
     """Return the console for results: as wide as the terminal, wide enough for any table elsewhere."""
     return Console(highlight=False) if Console().is_terminal else Console(highlight=False, width=240)
+
+
+def print_table(table: Table, console: Console, spare: Sequence[str]) -> None:
+    """Print a table; where it is too wide, leave columns out and name them below. No number is cut.
+
+    Args:
+        table: with texts as cells.
+        console: to print on.
+        spare: heads of the columns that may be left out, the least important first.
+    """
+    out: list[str] = []
+    there = [str(column.header) for column in table.columns]
+    for head in (each for each in spare if each in there):
+        if _width(table, console) <= console.width:
+            break
+        out.append(head)
+        table = _without(table, head)
+    console.print(table)
+    if out:
+        console.print(f"left out at this width: {', '.join(out)}; --json has all", style="dim", markup=False)
+
+
+def _width(table: Table, console: Console) -> int:
+    """Return the characters that a table needs to show every cell in one line."""
+    return console.measure(table, options=console.options.update(width=1000)).maximum
+
+
+def _without(table: Table, head: str) -> Table:
+    kept = [column for column in table.columns if column.header != head]
+    narrower = Table(box=None, pad_edge=table.pad_edge, title=table.title, title_justify=table.title_justify)
+    for column in kept:
+        narrower.add_column(column.header, justify=column.justify, no_wrap=column.no_wrap)
+    for cells in zip(*(column.cells for column in kept), strict=True):
+        narrower.add_row(*cells)
+    return narrower

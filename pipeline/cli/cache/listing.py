@@ -18,7 +18,7 @@ from semidense.pipeline.api import open_store
 from semidense.pipeline.cli.console import print_json
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.settings import Settings
-from semidense.pipeline.results.text import bytes_text, results
+from semidense.pipeline.results.text import bytes_text, print_table, results
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def list_entries(folder: Path | None, selection: Selection, as_json: bool) -> No
         times = (_age(entry.created), _age(_used(store, entry)), f"{entry.seconds:.2f} s")
         table.add_row(*label, bytes_text(entry.size), *times, short(entry.key), escape(_cut(settings.text(entry))))
     console = results()
-    console.print(table)
+    print_table(table, console, ("settings", "last used", "dataset", "made in", "age"))
     console.print(f"{len(entries)} entries, {bytes_text(sum(entry.size for entry in entries))}")
 
 

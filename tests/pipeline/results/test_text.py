@@ -1,9 +1,12 @@
+import io
 from pathlib import Path
 
 import pytest
+from rich.console import Console
+from rich.table import Table
 
 from semidense.pipeline.results.result import Result
-from semidense.pipeline.results.text import bytes_text, opening_text, time_text, value_text
+from semidense.pipeline.results.text import bytes_text, opening_text, print_table, time_text, value_text
 
 
 @pytest.mark.parametrize(
@@ -37,3 +40,26 @@ def test_the_code_that_opens_a_product_opens_it(trained: Result) -> None:
     names: dict[str, object] = {}
     exec(imports, names)
     assert eval(opening, names).attrs["key"] == made.key
+
+
+NUMBERS = {"name": "costvolume", "a": "1,234.56", "b": "-0.125", "c": "98.76 %"}
+
+
+@pytest.mark.parametrize(
+    ("width", "left_out"),
+    [
+        pytest.param(80, [], id="wide enough"),
+        pytest.param(33, ["b"], id="the least important one"),
+        pytest.param(24, ["b", "c"], id="two"),
+    ],
+)
+def test_a_narrow_table_leaves_columns_out_and_cuts_no_number(width: int, left_out: list[str]) -> None:
+    table = Table(*NUMBERS, box=None)
+    table.add_row(*NUMBERS.values())
+    console = Console(file=io.StringIO(), width=width)
+    print_table(table, console, ("b", "absent", "c"))
+    shown = console.file.getvalue()  # type: ignore[attr-defined]
+    rows = shown.splitlines()[:2]
+    assert rows[0].split() == [name for name in NUMBERS if name not in left_out]
+    assert rows[1].split() == " ".join(text for name, text in NUMBERS.items() if name not in left_out).split()
+    assert ("left out at this width: " + ", ".join(left_out) in " ".join(shown.split())) == bool(left_out)
