@@ -76,27 +76,49 @@ __all__ = [
     "write_png16",
 ]
 
-_MODULES = (
-    "errors",
-    "scene",
-    "registry",
-    "occlusion",
-    "formats.pfm",
-    "formats.png16",
-    "formats.calibration.middlebury",
-    "formats.images",
-    "formats.limits",
-)
+_HOMES = {
+    "IMAGE_ROLES": "scene",
+    "MAX_PIXELS": "formats.limits",
+    "TRUTH_ROLES": "scene",
+    "Calibration": "scene",
+    "CalibrationError": "errors",
+    "CalibrationFile": "formats.calibration.middlebury",
+    "Dataset": "registry",
+    "DatasetError": "errors",
+    "DisparityRange": "scene",
+    "ImageError": "errors",
+    "Kind": "registry",
+    "LayoutError": "errors",
+    "MissingFileError": "errors",
+    "PfmError": "errors",
+    "Png16Error": "errors",
+    "Scene": "scene",
+    "SceneNotFound": "errors",
+    "SceneReader": "scene",
+    "SceneSource": "scene",
+    "Truth": "scene",
+    "UnknownDatasetError": "errors",
+    "describe": "registry",
+    "image_size": "formats.images",
+    "left_right_check": "occlusion",
+    "open_dataset": "registry",
+    "read_calib": "formats.calibration.middlebury",
+    "read_image": "formats.images",
+    "read_pfm": "formats.pfm",
+    "read_png16": "formats.png16",
+    "register_dataset": "registry",
+    "warped_truth_mask": "occlusion",
+    "write_pfm": "formats.pfm",
+    "write_png16": "formats.png16",
+}
 
 
 if not TYPE_CHECKING:
     # Hidden from type checkers, which would take it to mean that any name is there.
     def __getattr__(name: str) -> object:
-        if name in __all__:
-            for module in _MODULES:
-                contents = vars(import_module(f"{__name__}.{module}"))
-                if name in contents:
-                    return contents[name]
+        """Import what a name stands for when it is first used: listing scenes needs no readers."""
+        if name in _HOMES:
+            return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

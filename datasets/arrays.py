@@ -22,7 +22,7 @@ def size_text(array: np.ndarray[Any, Any]) -> str:
     return " x ".join(map(str, array.shape[:2]))
 
 
-def describe(array: np.ndarray[Any, Any]) -> str:
+def array_text(array: np.ndarray[Any, Any]) -> str:
     """Return type and shape as a message says them."""
     return f"{array.dtype}, {' x '.join(map(str, array.shape)) or 'a scalar'}"
 
@@ -31,7 +31,9 @@ def check_image(what: str, image: ImageArray) -> None:
     """Refuse what is not an image: DatasetError."""
     gray_or_rgb = image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)
     if image.dtype not in (np.uint8, np.uint16) or not gray_or_rgb:
-        raise DatasetError(f"{what} is {describe(image)}; give uint8 or uint16, (rows, columns) or (rows, columns, 3)")
+        raise DatasetError(
+            f"{what} is {array_text(image)}; give uint8 or uint16, (rows, columns) or (rows, columns, 3)"
+        )
     if image.size == 0:
         raise DatasetError(f"{what} is empty ({size_text(image)} pixels)")
 
@@ -39,6 +41,6 @@ def check_image(what: str, image: ImageArray) -> None:
 def check_map(what: str, disparity: DisparityMap) -> None:
     """Refuse what is not a disparity map: DatasetError."""
     if disparity.dtype != np.float32 or disparity.ndim != 2 or disparity.size == 0:
-        raise DatasetError(f"{what} is {describe(disparity)}; give float32, (rows, columns), not empty")
+        raise DatasetError(f"{what} is {array_text(disparity)}; give float32, (rows, columns), not empty")
     if np.isinf(disparity).any():
         raise DatasetError(f"{what} holds infinite disparities; mark unknown pixels with NaN")

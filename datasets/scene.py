@@ -13,7 +13,7 @@ from typing import Any, Literal, Protocol, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.datasets.arrays import DisparityMap, ImageArray, Mask, check_image, check_map, describe, size_text
+from semidense.datasets.arrays import DisparityMap, ImageArray, Mask, array_text, check_image, check_map, size_text
 from semidense.datasets.errors import DatasetError
 from semidense.datasets.exact_files import exact_files, file_digest
 
@@ -109,7 +109,7 @@ class Truth:
         check_map("truth", self.disparity)
         if self.nonocc.dtype != np.bool_ or self.nonocc.shape != self.disparity.shape:
             raise DatasetError(
-                f"non-occlusion mask is {describe(self.nonocc)}; the truth needs bool, {size_text(self.disparity)}"
+                f"non-occlusion mask is {array_text(self.nonocc)}; the truth needs bool, {size_text(self.disparity)}"
             )
         if np.isnan(self.disparity[self.nonocc]).any():
             raise DatasetError("non-occlusion mask holds pixels whose truth is unknown; clear them first")
@@ -149,7 +149,7 @@ class Scene:
             check_image(f"{self.name}: {side} image", image)
         if self.left.shape != self.right.shape or self.left.dtype != self.right.dtype:
             raise DatasetError(
-                f"{self.name}: left image is {describe(self.left)}, right image {describe(self.right)}; "
+                f"{self.name}: left image is {array_text(self.left)}, right image {array_text(self.right)}; "
                 "both views must agree"
             )
         if self.truth is not None and self.truth.disparity.shape != self.left.shape[:2]:

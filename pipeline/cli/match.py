@@ -216,11 +216,9 @@ def _draw(match: "Match") -> None:
     """Draw the map of a single pair, if stdout is a terminal that can show it."""
     from rich.console import Console
 
-    from semidense.pipeline.cli.terminal import can_draw, draw_picture
+    from semidense.pipeline.cli.terminal import can_draw, draw_picture, small_disparity
 
     if can_draw(Console()):
-        from semidense.pipeline.cli.terminal import small_disparity
-
         draw_picture(*small_disparity(match.disparity))
 
 

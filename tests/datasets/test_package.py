@@ -43,3 +43,8 @@ def test_every_public_name_is_there(name: str) -> None:
 def test_another_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = datasets.nothing
+
+
+def test_a_name_is_the_one_that_is_documented_under_it() -> None:
+    """Two modules may define the same name: a public one has one home."""
+    assert datasets.describe.__module__ == "semidense.datasets.registry"
