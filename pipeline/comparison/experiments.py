@@ -39,7 +39,11 @@ from semidense.stages.stage import Arrays
 EXPERIMENTS = ("raw", "density", "auc")
 """What is compared: dense maps, semi-dense maps, and confidence measures."""
 BESIDE = {
-    "preset robust, single costs": ("use.disparity=disparity", "use.right_disparity=right_disparity"),
+    "preset robust, single costs": (
+        "use.disparity=disparity",
+        "use.right_disparity=right_disparity",
+        "use.confidence=confidence",
+    ),
     "preset robust": (),
 }
 """Settings of the preset ``robust`` that stand beside the default ones, by name: without and with aggregation."""
