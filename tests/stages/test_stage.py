@@ -51,9 +51,9 @@ def test_a_section_refuses_what_it_does_not_know() -> None:
 
 def test_by_scene() -> None:
     scenes = [{"left": np.zeros(1)}]
-    assert by_scene({"images": scenes}, "images") is scenes
+    assert by_scene(scenes, "images") is scenes
     with pytest.raises(StageError, match="no training scene has 'images': name a dataset with a training split"):
-        by_scene({"images": []}, "images")
+        by_scene([], "images")
 
 
 @pytest.mark.parametrize("shape", [(), (3,), (3, 4, 5)])

@@ -12,7 +12,7 @@ from semidense.pipeline.results.result import Result
 from tests.tiny import PATH, TRAINED
 
 ALL = PATH
-BELOW_CHANNELS = ALL - {"images", "truth", "matching_samples"}
+BELOW_CHANNELS = ALL - {"images", "truth", "matching_samples", "distinctiveness"}
 
 
 @pytest.fixture(scope="module")

@@ -37,7 +37,8 @@ def test_a_signal_in_the_middle_of_a_stage(start: Start, own_cache: Path, number
     assert "Traceback" not in err
     assert list((own_cache / "drafts").iterdir()) == []
     plan = status(Task(SPEC, settings=(*SETTINGS, *LONG), train=True, cache=own_cache))
-    assert {planned.step.product for planned in plan.steps if planned.state == "hit"} == {
+    made = {planned.step.product for planned in plan.steps if planned.state == "hit"}
+    assert made - {"distinctiveness"} == {  # it needs the images alone: before the training, or after
         "images", "truth", "channels", "matching_samples",
     }  # fmt: skip
 

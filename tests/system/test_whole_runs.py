@@ -138,14 +138,14 @@ def test_one_row_a_tile_or_all_at_once_is_the_same(
     Costs in float32, as far as float16 tells: where a tile of transformed cells begins follows the runner's tile, and
     with it the roundings, which in bfloat16 are larger.
     """
-    from semidense.pipeline.plan import steps
+    from semidense.pipeline.plan import building
 
     scene = "synthetic:train=0,test=1,height=64,width=80,disparities=8"
     task = Task(scene, settings=("costvolume.precision=float32",), cache=tmp_path / "usual")
     usual = api.run(task, "semidense")
     for rows in (13, 64):
         cut = {name: replace(stage, tile_rows=stage.tile_rows and rows) for name, stage in STAGES.items()}
-        monkeypatch.setattr(steps, "STAGES", cut)
+        monkeypatch.setattr(building, "STAGES", cut)
         result = api.run(replace(task, cache=tmp_path / str(rows)), "semidense")
         for product, name in (("channels", "channels"), ("costvolume", "cost"), ("disparity", "disparity")):
             found, expected = (
