@@ -30,7 +30,8 @@ def compare(
     dataset: Annotated[str, typer.Argument(help="Scenes with a ground truth, such as middlebury:DIR.")] = "motorcycle",
     scene: SceneOption = None,
     experiment: Annotated[
-        list[str] | None, typer.Option("--experiment", help="raw, density or auc; may be repeated [default: all].")
+        list[str] | None,
+        typer.Option("--experiment", help="Run this experiment: raw, density or auc; may be repeated [default: all]."),
     ] = None,
     train_on: Annotated[
         str | None,
@@ -42,16 +43,16 @@ def compare(
         list[str] | None,
         typer.Option(
             "--protocol",
-            help="Also train and test by the paper's own protocols: same (pairs) or folds (over them, with those of "
-            "--train-on); may be repeated.",
+            help="Also train and test as the paper does: same (train on the tested pairs) or folds (train on half of "
+            "them and --train-on, test on the other half); may be repeated.",
         ),
     ] = None,
     without: Annotated[
         list[str] | None,
         typer.Option(
             "--without",
-            help="Leave out a matcher or measure, such as mc_cnn_accurate, or ablation, the networks of fewer "
-            "channels; may be repeated.",
+            help="Leave out a matcher or measure, such as mc_cnn_accurate; ablation leaves out the networks of fewer "
+            "channels. May be repeated.",
         ),
     ] = None,
     threshold: Annotated[
@@ -72,7 +73,7 @@ def compare(
 ) -> None:
     """Compare other matchers with the two networks.
 
-    The paper's experiments: raw maps, error at equal density, confidence measures.
+    Runs the paper's experiments: raw maps, error at equal density, confidence measures.
     """
     from semidense.pipeline import api
     from semidense.pipeline.cli import console

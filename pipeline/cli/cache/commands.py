@@ -7,9 +7,11 @@ import typer
 
 from semidense.pipeline.cli.options import CacheOption, JsonOption
 
-cache_app = typer.Typer(help="Look into the cache, check, clean and share it.", no_args_is_help=True)
+cache_app = typer.Typer(help="List, check, clean and share the entries of the cache.", no_args_is_help=True)
 
-KeysArgument = Annotated[list[str] | None, typer.Argument(metavar="[KEY]...", help="Keys, or the start of them.")]
+KeysArgument = Annotated[
+    list[str] | None, typer.Argument(metavar="[KEY]...", help="Keys of entries, or the first letters of keys.")
+]
 ProductOption = Annotated[str | None, typer.Option("--product", help="Only entries of this product.")]
 OnlySceneOption = Annotated[str | None, typer.Option("--scene", help="Only entries of this scene.")]
 
@@ -24,7 +26,7 @@ def cache_ls(
 ) -> None:
     """List the entries.
 
-    Product, scene, size, age, last use, the settings they belong to, key.
+    Each line has product, scene, size, age, last use, the settings that made the entry, and its key.
     """
     from semidense.pipeline.cli.cache.listing import Selection, list_entries
 
@@ -39,9 +41,9 @@ def cache_verify(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Compare every byte with what was published.
+    """Check that no byte of an entry has changed.
 
-    Of all entries, or of some; the exit code is 1 if one is damaged.
+    Checks all entries, or those that are named. The exit code is 1 if one is damaged.
     """
     from semidense.pipeline.cli.cache.listing import Selection, verify_entries
 
@@ -51,7 +53,7 @@ def cache_verify(
 
 @cache_app.command("size")
 def cache_size(cache: CacheOption = None, as_json: JsonOption = False) -> None:
-    """Say how much space each product takes."""
+    """Print how much space each product takes."""
     from semidense.pipeline.cli.cache.listing import print_sizes
 
     print_sizes(cache, as_json)
@@ -61,25 +63,34 @@ def cache_size(cache: CacheOption = None, as_json: JsonOption = False) -> None:
 def cache_gc(
     keep: Annotated[
         list[str] | None,
-        typer.Option("--keep", metavar="DATASET", help="Keep what a run of it reaches; may be repeated."),
+        typer.Option("--keep", metavar="DATASET", help="Keep what `pipeline run DATASET` uses; may be repeated."),
     ] = None,
     config: Annotated[
-        list[Path] | None, typer.Option("--config", help="Keep it as this TOML file sets it; may be repeated.")
+        list[Path] | None, typer.Option("--config", help="Settings of the runs to keep, a TOML file; may be repeated.")
     ] = None,
-    train: Annotated[bool, typer.Option("--train", help="Keep it as run with --train.")] = False,
+    train: Annotated[bool, typer.Option("--train", help="The runs to keep have --train.")] = False,
     unused_for: Annotated[
-        str | None, typer.Option("--unused-for", metavar="AGE", help="Only entries unused for this long: 30d, 12h.")
+        str | None,
+        typer.Option("--unused-for", metavar="AGE", help="Delete entries that were not used for this long: 30d, 12h."),
     ] = None,
     max_size: Annotated[
-        str | None, typer.Option("--max-size", metavar="SIZE", help="Only as many as bring the cache to this: 20GB.")
+        str | None,
+        typer.Option(
+            "--max-size",
+            metavar="SIZE",
+            help="Delete the entries unused for longest, until the cache has this size: 20GB.",
+        ),
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Delete; without it, only show what would be deleted.")] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Delete; without this option, only show what would be deleted.")
+    ] = False,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show what can be deleted and why; delete with --yes.
 
-    Leftovers always; entries by reach, age or size.
+    Leftovers of dead runs and entries of another version can always go. Other entries need --keep, --unused-for or
+    --max-size.
     """
     from semidense.pipeline.cli.cache.cleaning import Wish, clean
 
@@ -93,11 +104,11 @@ def cache_export(
     keys: KeysArgument = None,
     product: ProductOption = None,
     scene: OnlySceneOption = None,
-    inputs: Annotated[bool, typer.Option("--inputs", help="Also all that the entries were made from.")] = False,
+    inputs: Annotated[bool, typer.Option("--inputs", help="Also write the entries that these were made from.")] = False,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write entries, each checked, into one file to pass on."""
+    """Check entries and write them into one archive."""
     from semidense.pipeline.cli.cache.listing import Selection
     from semidense.pipeline.cli.cache.sharing import export_archive
 
@@ -110,9 +121,9 @@ def cache_import(
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Take over the entries of an archive.
+    """Add the entries of an archive to the cache.
 
-    Each is checked to the byte, and is there whole or not at all.
+    Every byte is checked. An entry is added whole, or not at all.
     """
     from semidense.pipeline.cli.cache.sharing import import_archive
 
@@ -122,13 +133,15 @@ def cache_import(
 @cache_app.command("trace")
 def cache_trace(
     key: Annotated[str, typer.Argument(help="A key, or the start of one; `cache ls` shows them.")],
-    graph: Annotated[Path | None, typer.Option("--graph", help="Draw it into this file (SVG, PNG, PDF).")] = None,
+    graph: Annotated[
+        Path | None, typer.Option("--graph", help="Draw the inputs as a graph into this file (SVG, PNG or PDF).")
+    ] = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show what an entry was made from.
 
-    Up to images, weights and code.
+    Follows its inputs back to images, weights and code.
     """
     from semidense.pipeline.cli.cache.sharing import trace
 
