@@ -67,7 +67,7 @@ def in_threads(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a folder is there itself; a link to one is none."""
+    """Return whether the path is a folder; a link to a folder does not count."""
     return path.is_dir() and not path.is_symlink()
 
 

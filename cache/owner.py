@@ -1,4 +1,4 @@
-"""Who holds a lock, in words for people. What is alive is told by held locks, never by these names."""
+"""Name the process that holds a lock. Whether it is alive is decided by the lock itself, never by this name."""
 
 import os
 import re
@@ -14,7 +14,7 @@ def owner() -> str:
 
 
 def describe(name: str) -> str | None:
-    """Return what ``owner`` gave as words for people, ``process 123 on host``; None for any other text."""
+    """Return the text of ``owner`` in readable form, such as ``process 123 on host``; None for any other text."""
     match = _OWNER.fullmatch(name)
     return f"process {match['pid']} on {match['host']}" if match else None
 

@@ -1,4 +1,4 @@
-"""Is an entry, to the byte, what was published? Looking changes nothing."""
+"""Check that every byte of an entry is as it was published. Checking changes nothing."""
 
 import errno
 import os

@@ -177,7 +177,7 @@ class Draft:
         return all((self.path / DATA / name / chunk).is_file() for chunk in chunk_paths(shape, chunks, region))
 
     def published(self) -> Entry | None:
-        """Return the entry that the draft became; None if it became none, or is still there.
+        """Return the entry that the draft became; None if it was deleted, or is still there.
 
         Where a publisher was killed between its last steps, they are done now.
 

@@ -224,7 +224,7 @@ class _Bare(ast.NodeTransformer):
 
 
 def _imports(tree: ast.AST, module: _Module) -> Iterator[str]:
-    """Yield each dotted name that might be a module imported here; names that are none are harmless."""
+    """Yield each dotted name that might be a module imported here; names of other things do no harm."""
     for node in _running(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:

@@ -1,4 +1,4 @@
-"""The texts of the modules that made entries: what lets a code change be told by function and line.
+"""Keep the texts of the modules that made entries, so that a change of code can be shown by function and line.
 
 A text is kept under the hash of its code and checked against it when it is read, so it needs no other guard;
 one that is missing or damaged costs an explanation, never a result.

@@ -34,7 +34,7 @@ class Lease:
 
     @property
     def name(self) -> str | None:
-        """What the drafts of its run begin with; None in a cache that cannot be written."""
+        """The first part of the names of its run's drafts; None in a cache that cannot be written."""
         return self.path.name if self.path else None
 
     def discard_drafts(self) -> None:

@@ -1,4 +1,4 @@
-"""Look at a whole cache: is every entry sound, and what takes up the space? Nothing is changed."""
+"""Check every entry of a cache, and measure what takes up its space. Nothing is changed."""
 
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor

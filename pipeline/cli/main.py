@@ -74,7 +74,7 @@ def main() -> None:
 
 
 def _require_streams() -> None:
-    """See to it that messages have somewhere to go, and refuse to work where results have not."""
+    """Give messages an open stream, and refuse to work if results have no open one."""
     if sys.stderr is None:
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115, PTH123 - it takes the place of the closed one, for good
     if sys.stdout is None:

@@ -1,4 +1,4 @@
-"""The commands that make products and tell of them. Nothing heavy is imported before one runs."""
+"""The commands that make and describe products. Nothing heavy is imported before one runs."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated

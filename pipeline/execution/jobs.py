@@ -1,4 +1,4 @@
-"""What the tasks of a run are given and hand on, and how their errors are told."""
+"""The data that tasks of a run take and pass on, and the messages of their errors."""
 
 import threading
 from collections import OrderedDict

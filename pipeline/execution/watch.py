@@ -1,4 +1,4 @@
-"""What is told how a run goes on."""
+"""The interface of progress displays: a run calls it."""
 
 from typing import Protocol
 
@@ -8,7 +8,7 @@ from semidense.pipeline.plan.steps import Step
 
 
 class Watch(Protocol):
-    """What is told how a run goes on, from any thread."""
+    """The interface of a progress display. A run calls it, from any thread."""
 
     def planned(self, plan: Plan, store: Store) -> None:
         """A run begins: it will make what the plan lacks."""

@@ -48,19 +48,19 @@ def view_rgb(view: NDArray[Any]) -> NDArray[np.uint8]:
 
 @cache
 def disparity_colours() -> Colormap:
-    """Return the colours of disparities: near is yellow, far is blue, none is black."""
+    """Return the colours of disparities: near is yellow, far is blue, missing is black."""
     return _part("viridis", 0.2, 1)
 
 
 @cache
 def confidence_colours() -> Colormap:
-    """Return the colours of confidences, different from those of disparities: sure is yellow, none is black."""
+    """Return the colours of confidences, different from those of disparities: sure is yellow, missing is black."""
     return _part("cividis", 0.15, 1)
 
 
 @cache
 def cost_colours() -> Colormap:
-    """Return the colours of costs: a match is orange, a mismatch purple, undecided white, none is black."""
+    """Return the colours of costs: a match is orange, a mismatch purple, undecided white, missing black."""
     return _part("PuOr", 0.1, 0.9)
 
 

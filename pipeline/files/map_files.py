@@ -1,4 +1,4 @@
-"""Write a map of numbers in the formats that people use; each file says what it holds where its format lets it."""
+"""Write a map of numbers in common formats; each file describes its content where its format allows it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Which of a run's results a user wants as files, and how those files are called."""
+"""Choose which results of a run are written as files, and name the files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

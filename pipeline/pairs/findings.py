@@ -19,7 +19,7 @@ _LEAST_OFFSET = 1.0
 def findings(
     survey: Mapping[str, Array], searched: DisparityRange | None, known: Calibration | None = None
 ) -> list[str]:
-    """Return a line for each thing that a user should look into; none for a sound pair.
+    """Return one line for each problem of a pair; an empty list for a sound pair.
 
     Args:
         survey: the product's arrays.

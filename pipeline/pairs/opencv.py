@@ -1,4 +1,4 @@
-"""A drop-in for those who call OpenCV's ``StereoSGBM``."""
+"""A replacement for OpenCV's ``StereoSGBM`` with the same calls."""
 
 from collections.abc import Mapping
 from dataclasses import fields

@@ -30,7 +30,7 @@ class Causes:
         self._code = cache(self._code_text)
 
     def of(self, step: Step, changes: Iterable[Change], above: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-        """Return the causes of a step's changes, a line each, none twice.
+        """Return the causes of a step's changes, one line each, without repetition.
 
         Args:
             step: the step.

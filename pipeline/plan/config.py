@@ -243,7 +243,7 @@ def _merge(tree: dict[str, Any], setting: str, model: type[Config], over: bool =
 
 
 def _annotation(model: type[Config], section: str, field: str) -> object:
-    """Return the type of a setting; None if there is no such one."""
+    """Return the type of a setting; None if there is no setting of this name."""
     known = model.model_fields.get(section)
     found = getattr(known.annotation, "model_fields", {}).get(field) if known else None
     return found.annotation if found else None

@@ -38,7 +38,7 @@ _NO_MEMORY = ("allocate memory", "can't start new thread", "failed to map segmen
 
 
 def told(error: BaseException) -> str | None:
-    """Return one line for what the user or the machine is to mend; None for a fault of the program."""
+    """Return one line for an error that the user or the machine can mend; None for a fault of the program."""
     if isinstance(error, USER_ERRORS):
         return str(error)
     if _lacks_memory(error):
@@ -51,7 +51,7 @@ def told(error: BaseException) -> str | None:
 
 
 def told_of_stage(error: Exception) -> str | None:
-    """Return one line for what a stage could not do for want of the user's or the machine's; None for its own fault."""
+    """Return one line for an error of a stage that the user or the machine can mend; None for a fault of the stage."""
     machine = isinstance(error, OSError) and error.errno in _MACHINE_ERRNOS
     return told(error) if isinstance(error, USER_ERRORS) or machine or _lacks_memory(error) else None
 

@@ -30,7 +30,7 @@ def products() -> tuple[str, ...]:
 
 
 def place(product: str) -> int:
-    """Return where a product stands in that order; one whose package is not installed any more stands last."""
+    """Return the position of a product in that order; one whose package is not installed any more stands last."""
     return [*products(), product].index(product)
 
 

@@ -95,7 +95,7 @@ class _Measured:
         return nearest.seconds * prod(step.size) * disparities / (_pixels(nearest) * self._searched(nearest))
 
     def _searched(self, entry: Entry) -> int:
-        """Return how many disparities were searched for an entry or for what it was made from; 1 for neither."""
+        """Return how many disparities an entry, or one of its inputs, has searched; 1 if none did."""
         if entry.key not in self._disparities:
             self._disparities[entry.key] = 1  # before its inputs': a hostile record may name itself
             pairs = [(product, each) for product, all_ in inputs_of(entry.recipe).items() for each in all_]
@@ -105,7 +105,7 @@ class _Measured:
 
 
 def _planned_disparities(plan: Plan) -> dict[str, int]:
-    """Return how many disparities are searched for each step or for what it is made from; 1 for neither."""
+    """Return how many disparities each step, or one of its inputs, searches; 1 if none does."""
     found: dict[str, int] = {}
     for step in (planned.step for planned in plan.steps):
         above = (found[each] for ids in step.inputs.values() for each in ids)

@@ -61,7 +61,7 @@ def mean_name(scenes: int) -> str:
 
 
 def mean_rows(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return the mean over scenes of rows that differ in nothing but the scene; its ``scene`` is ``mean of N``.
+    """Return the mean over the scenes, for rows that agree in everything else; its ``scene`` is ``mean of N``.
 
     A figure that one of the N scenes lacks has no mean: means over different scenes cannot be compared. ``pixels`` is
     their sum.

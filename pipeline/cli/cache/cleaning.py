@@ -66,7 +66,7 @@ def _useless(store: Store) -> dict[str, str]:
 
 
 def _possible(entries: Iterable[Entry], planned: Planned) -> Iterator[str]:
-    """Yield the entries that a step may turn out to be, while what it is made from is not there."""
+    """Yield the entries that a step may still find, as long as its inputs are missing."""
     step = planned.step
     for entry in entries:
         same = (entry.recipe.code, entry.recipe.params, entry.recipe.environment)

@@ -23,7 +23,7 @@ from semidense.pipeline.results.text import bytes_text, print_table, results
 
 @dataclass(frozen=True)
 class Selection:
-    """Which entries a command is about: all, or those of some keys, a product or a scene."""
+    """The entries that a command works on: all, or only those of some keys, a product or a scene."""
 
     keys: tuple[str, ...] = ()
     product: str | None = None
@@ -59,7 +59,7 @@ class Selection:
 
     @property
     def is_all(self) -> bool:
-        """Whether nothing narrows it down."""
+        """Whether all entries are selected."""
         return self == Selection()
 
 

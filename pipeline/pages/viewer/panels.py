@@ -58,7 +58,7 @@ def words(name: str, text: str = "") -> Div:
 
 
 def mapper(colours: Colormap, low: float, high: float) -> LinearColorMapper:
-    """Return a scale of colours with black for none."""
+    """Return a colour scale that shows missing values in black."""
     palette = [to_hex(each) for each in colours(np.linspace(0, 1, 256))]
     return LinearColorMapper(palette=palette, low=low, high=high, nan_color=NONE)
 
