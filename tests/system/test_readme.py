@@ -1,4 +1,4 @@
-"""Every command that the README shows is one."""
+"""Every command, setting, target and file that the README and the other documents name is there."""
 
 import re
 import shlex
@@ -11,11 +11,21 @@ import typer.main
 
 from semidense.pipeline.cli.main import app
 
-README = Path(__file__).parents[2] / "README.md"
-BLOCKS = re.findall(r"^```\w*\n(.*?)^```", README.read_text(), re.DOTALL | re.MULTILINE) if README.is_file() else []
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = [
+    file for file in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*.md"))) if file.is_file()
+]
+TEXT = "\n".join(file.read_text() for file in DOCUMENTS)
+ELSEWHERE = "roughness"
+"""The stage of docs/extending.md, which is in a package of its own; tests/system/test_extension.py tries its kind."""
+BLOCKS = re.findall(r"^```\w*\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
 LINES = [line.strip() for block in BLOCKS for line in block.splitlines()]
-INLINE = re.findall(r"`(pipeline [^`]+)`", README.read_text()) if README.is_file() else []
-COMMANDS = [re.sub(r"^\S*?bin/", "", line) for line in LINES if re.match(r"(\S*bin/)?pipeline(\s|$)", line)]
+INLINE = [line for line in re.findall(r"`(pipeline [^`]+)`", TEXT) if len(line.split()) > 2]  # two name a command
+COMMANDS = [
+    re.sub(r"^\S*?bin/", "", line)
+    for line in LINES
+    if re.match(r"(\S*bin/)?pipeline(\s|$)", line) and ELSEWHERE not in line
+]
 TARGETS = {line.split()[1] for line in LINES if line.startswith("make ")}
 
 
@@ -62,4 +72,11 @@ def test_the_settings_and_thresholds_of_the_readme_are_valid(line: str) -> None:
 
 @pytest.mark.parametrize("target", sorted(TARGETS))
 def test_a_target_of_the_readme_is_in_the_makefile(target: str) -> None:
-    assert re.search(rf"^{re.escape(target)}:", README.with_name("Makefile").read_text(), re.MULTILINE)
+    assert re.search(rf"^{re.escape(target)}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
+
+
+def test_the_modules_that_the_documents_name_are_there() -> None:
+    rooms = [ROOT, *(ROOT / package for package in ("pipeline", "stages", "datasets", "cache"))]
+    ours = [name for name in re.findall(r"`([\w/]+/\w+\.py)`", TEXT) if not name.startswith("stereo_extras/")]
+    assert [name for name in ours if not any((room / name).is_file() for room in rooms)] == []
+    assert len(ours) > 10, "the documents name modules in another way: find them"
