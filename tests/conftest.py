@@ -16,6 +16,9 @@ if TYPE_CHECKING:  # the package is imported when it is used: most tests do with
     from semidense.pipeline.api import Task
     from semidense.pipeline.results.result import Result
 
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as where a shell starts the tests in the background
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
 PROJECT = Path(__file__).parents[1]
 EXPECTED_SKIPS = ("no real data in ", "this system has no /proc")
 """How the reasons begin for which a test may be skipped in CI; any other is a failure there."""

@@ -47,7 +47,7 @@ def refused(ran: Any, *words: str) -> None:  # noqa: ANN401
         pytest.param(["run", TEST_ONLY, "--train"], ["no training scene", "training.dataset"], id="nothing to learn"),
         pytest.param(["run", TEST_ONLY, "--set", "costvolume.d_min=9"], ["d_max 8", "d_min 9"], id="an empty range"),
         pytest.param(["run", TEST_ONLY, "--set", "costvolume.d_max=999999999"], ["80 px wide"], id="an endless range"),
-        pytest.param(["inspect", "disparity", TEST_ONLY], ["not cached", "run --upto disparity"], id="not made"),
+        pytest.param(["inspect", "disparity", TEST_ONLY], ["not cached", "--upto disparity"], id="not made"),
         pytest.param(["data", "list", "kiti2015:/x"], ["kitti2015"], id="no such dataset to list"),
     ],
 )  # fmt: skip
