@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib.format import open_memmap
 from numpy.typing import NDArray
 
 from semidense.datasets.errors import DatasetError, MissingFileError
@@ -38,11 +39,11 @@ def read_costs(path: Path) -> NDArray[np.float16]:
 
 def _opened(path: Path) -> NDArray[Any]:
     try:
-        costs: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
+        costs: NDArray[Any] = open_memmap(path, mode="r")  # unlike np.load, it takes .npy alone
     except OSError as error:
         raise MissingFileError(f"{path}: cannot be read ({error.strerror or error})") from error
     except ValueError as error:
-        raise DatasetError(f"{path}: no NumPy file (.npy) of a cost volume: {error}") from error
+        raise DatasetError(f"{path}: this is not a NumPy file (.npy) of a cost volume ({error})") from error
     if costs.ndim != 3 or costs.dtype.kind != "f" or not costs.size:
         raise DatasetError(f"{path}: {costs.dtype} {costs.shape}; a cost volume has dims y, x, d in floating point")
     return costs

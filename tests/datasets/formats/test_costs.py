@@ -24,7 +24,7 @@ def test_a_volume_is_read(tmp_path: Path) -> None:
         pytest.param(np.zeros((0, 3, 4)), "dims y, x, d", id="empty"),
         pytest.param(np.full((1, 1, 1), np.inf), "infinite", id="infinite"),
         pytest.param(np.full((1, 1, 1), 1e6), "beyond 65504", id="too large for its type"),
-        pytest.param(np.array([{}]), "no NumPy file", id="a pickle"),
+        pytest.param(np.array([{}]), "not a NumPy file", id="a pickle"),
     ],
 )
 def test_what_is_no_volume_is_refused_in_one_line(array: np.ndarray, message: str, tmp_path: Path) -> None:
@@ -36,6 +36,10 @@ def test_what_is_no_volume_is_refused_in_one_line(array: np.ndarray, message: st
 
 def test_a_file_that_is_not_there_or_no_array_is_named(tmp_path: Path) -> None:
     (tmp_path / "text.npy").write_text("no array")
-    for name in ("none.npy", "text.npy"):
+    (tmp_path / "empty.npy").write_bytes(b"")
+    np.save(tmp_path / "whole.npy", np.zeros((2, 3, 4)))
+    (tmp_path / "cut.npy").write_bytes((tmp_path / "whole.npy").read_bytes()[:200])
+    np.savez(tmp_path / "several.npz", costs=np.zeros((2, 3, 4)))
+    for name in ("none.npy", "text.npy", "empty.npy", "cut.npy", "several.npz"):
         with pytest.raises(DatasetError, match=name):
             costs_shape(tmp_path / name)
