@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from semidense.pipeline.cli import compare, match, run, show
-from semidense.pipeline.cli.cache.commands import cache_app
+from semidense.pipeline.cli.commands import compare, match, run, show
+from semidense.pipeline.cli.commands.cache.commands import cache_app
 
 app = typer.Typer(
     help="Semi-dense stereo matching with two CNNs; every stage is cached.",

@@ -8,8 +8,8 @@ from rich.console import Console
 from semidense.cache import Store
 from semidense.pipeline.api import Task, explain
 from semidense.pipeline.cli import console as printing
-from semidense.pipeline.cli import inspect
-from semidense.pipeline.cli.cache import listing
+from semidense.pipeline.cli.commands import inspect
+from semidense.pipeline.cli.commands.cache import listing
 from semidense.pipeline.results.result import Result
 
 

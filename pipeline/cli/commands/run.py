@@ -162,7 +162,7 @@ def explain(
     Also shows why the product would be made again, and from what it was made.
     """
     from semidense.pipeline import api
-    from semidense.pipeline.cli.explain import draw_provenance, explanation, print_explanation
+    from semidense.pipeline.cli.commands.explain import draw_provenance, explanation, print_explanation
     from semidense.pipeline.plan.config import preset_settings
 
     task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
@@ -201,7 +201,7 @@ def inspect(
     Also shows how to open it in Python. Terminals with colours show a map at once.
     """
     from semidense.pipeline import api
-    from semidense.pipeline.cli.inspect import draw, inspection, print_inspection
+    from semidense.pipeline.cli.commands.inspect import draw, inspection, print_inspection
 
     task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     planned = api.explain(task, product)

@@ -28,7 +28,7 @@ def cache_ls(
 
     Each line has product, scene, size, age, last use, the settings that made the entry, and its key.
     """
-    from semidense.pipeline.cli.cache.listing import Selection, list_entries
+    from semidense.pipeline.cli.commands.cache.listing import Selection, list_entries
 
     list_entries(cache, Selection(tuple(keys or ()), product, scene), as_json)
 
@@ -45,7 +45,7 @@ def cache_verify(
 
     Checks all entries, or those that are named. The exit code is 1 if one is damaged.
     """
-    from semidense.pipeline.cli.cache.listing import Selection, verify_entries
+    from semidense.pipeline.cli.commands.cache.listing import Selection, verify_entries
 
     if not verify_entries(cache, Selection(tuple(keys or ()), product, scene), as_json):
         raise typer.Exit(1)
@@ -54,7 +54,7 @@ def cache_verify(
 @cache_app.command("size")
 def cache_size(cache: CacheOption = None, as_json: JsonOption = False) -> None:
     """Print how much space each product takes."""
-    from semidense.pipeline.cli.cache.listing import print_sizes
+    from semidense.pipeline.cli.commands.cache.listing import print_sizes
 
     print_sizes(cache, as_json)
 
@@ -92,7 +92,7 @@ def cache_gc(
     Leftovers of dead runs and entries of another version can always go. Other entries need --keep, --unused-for or
     --max-size.
     """
-    from semidense.pipeline.cli.cache.cleaning import Wish, clean
+    from semidense.pipeline.cli.commands.cache.cleaning import Wish, clean
 
     wish = Wish(tuple(keep or ()), tuple(config or ()), train, unused_for, max_size)
     clean(cache, wish, yes=yes, as_json=as_json)
@@ -109,8 +109,8 @@ def cache_export(
     as_json: JsonOption = False,
 ) -> None:
     """Check entries and write them into one archive."""
-    from semidense.pipeline.cli.cache.listing import Selection
-    from semidense.pipeline.cli.cache.sharing import export_archive
+    from semidense.pipeline.cli.commands.cache.listing import Selection
+    from semidense.pipeline.cli.commands.cache.sharing import export_archive
 
     export_archive(cache, Selection(tuple(keys or ()), product, scene), archive, inputs=inputs, as_json=as_json)
 
@@ -125,7 +125,7 @@ def cache_import(
 
     Every byte is checked. An entry is added whole, or not at all.
     """
-    from semidense.pipeline.cli.cache.sharing import import_archive
+    from semidense.pipeline.cli.commands.cache.sharing import import_archive
 
     import_archive(cache, archive, as_json)
 
@@ -143,6 +143,6 @@ def cache_trace(
 
     Follows its inputs back to images, weights and code.
     """
-    from semidense.pipeline.cli.cache.sharing import trace
+    from semidense.pipeline.cli.commands.cache.sharing import trace
 
     trace(cache, key, graph, as_json)

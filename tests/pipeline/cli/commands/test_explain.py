@@ -4,7 +4,7 @@ import pytest
 
 from semidense.cache import Store
 from semidense.pipeline.api import Task, explain
-from semidense.pipeline.cli.explain import explanation, print_explanation
+from semidense.pipeline.cli.commands.explain import explanation, print_explanation
 from semidense.pipeline.plan.plan import Plan
 from semidense.pipeline.results.result import Result
 from tests.pipeline.toy import chain

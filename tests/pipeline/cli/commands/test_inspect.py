@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from semidense.pipeline.api import Task, explain, open_store
-from semidense.pipeline.cli.inspect import Inspection, draw, inspection, statistics
+from semidense.pipeline.cli.commands.inspect import Inspection, draw, inspection, statistics
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.result import Result
 

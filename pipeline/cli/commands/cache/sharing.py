@@ -4,7 +4,7 @@ from pathlib import Path
 
 from semidense.cache.upkeep.archive import export_entries, import_entries
 from semidense.pipeline.api import open_store
-from semidense.pipeline.cli.cache.listing import Selection
+from semidense.pipeline.cli.commands.cache.listing import Selection
 from semidense.pipeline.cli.console import print_json
 from semidense.pipeline.results.provenance import Provenance, ancestry, tree_lines
 from semidense.pipeline.results.text import bytes_text, results

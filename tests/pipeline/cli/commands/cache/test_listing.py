@@ -2,7 +2,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from semidense.pipeline.cli.cache.listing import Selection, _age, bytes_text, list_entries, verify_entries
+from semidense.pipeline.cli.commands.cache.listing import Selection, _age, bytes_text, list_entries, verify_entries
 from semidense.pipeline.results.result import Result
 
 

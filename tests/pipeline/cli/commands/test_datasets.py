@@ -3,7 +3,7 @@ import json
 import pytest
 
 from semidense.datasets import DatasetError, describe
-from semidense.pipeline.cli.show import list_datasets, list_scenes
+from semidense.pipeline.cli.commands.show import list_datasets, list_scenes
 
 
 def test_every_dataset_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
