@@ -3,6 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 MODE := exact
+APART := tests/faults tests/benchmarks tests/cache tests/datasets
 OF_MODE := $(if $(filter guided,$(MODE)),.guided)
 ifeq ($(filter exact guided,$(MODE)),)
 $(error MODE=$(MODE): the weights that come with the package are of exact and of guided volumes)
@@ -13,8 +14,8 @@ endif
 demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
 	$(BIN)/pipeline run motorcycle --output demo
 
-test: $(READY)  ## run the tests
-	$(BIN)/python -m pytest tests
+test: $(READY)  ## run the tests, in two processes side by side
+	printf '%s\n' '$(APART)' 'tests $(APART:%=--ignore=%)' | xargs -P 2 -L 1 $(BIN)/python -m pytest
 
 lint: $(READY)  ## style, types, and who may import whom
 	mkdir -p build/names/semidense  # mypy does not follow the import hook of an editable install

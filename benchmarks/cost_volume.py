@@ -52,11 +52,12 @@ def main(
     ),
     pairs: Annotated[int, typer.Option()] = PAIRS,
     install: Annotated[bool, typer.Option(help="install MC-CNN accurate into build/bench")] = True,
+    dataset: Annotated[str, typer.Option(help="where the scene comes from")] = "motorcycle",
     picture: Annotated[Path, typer.Option()] = PICTURE,
 ) -> None:
     """Print the ratio and the table, write both as JSON, draw the picture."""
     keep_one_thread()
-    scene = open_dataset("motorcycle").scenes[0].load()
+    scene = open_dataset(dataset).scenes[0].load()
     ratios = list(_against_accurate(scene, crop, pairs)) if install else []
     first = (scene.left.shape[0] - rows) // 2
     part = slice(first, first + rows)
@@ -71,7 +72,7 @@ def main(
     for name, found in matchers.items():
         table.add_row(name, f"{found['seconds']:.3g}", f"{found['raw_bad']:.1f}")
     Console(width=120).print(table)
-    _draw(matchers, rows, picture)
+    _draw(matchers, f"{scene.name}, {rows} rows", picture)
 
 
 def _volume(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: range) -> NDArray[np.float32]:
@@ -162,7 +163,7 @@ def _fast_matchers(gray: tuple[NDArray[np.uint8], NDArray[np.uint8]], disparitie
     return {f"MC-CNN fast, {name}": matcher(file) for name, file in names.items()}
 
 
-def _draw(matchers: dict[str, dict[str, float]], rows: int, path: Path) -> None:
+def _draw(matchers: dict[str, dict[str, float]], title: str, path: Path) -> None:
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -171,7 +172,7 @@ def _draw(matchers: dict[str, dict[str, float]], rows: int, path: Path) -> None:
     figure, axes = plt.subplots(figsize=(7.5, 3.6), layout="constrained")
     for name, found in matchers.items():
         axes.scatter(found["seconds"], found["raw_bad"], label=name)
-    axes.set(xscale="log", xlabel="seconds", ylabel="raw error > 1 px, %", title=f"Motorcycle, {rows} rows")
+    axes.set(xscale="log", xlabel="seconds", ylabel="raw error > 1 px, %", title=title)
     axes.set_ylim(bottom=0)
     axes.grid(alpha=0.3, which="both")
     figure.legend(loc="outside right upper")

@@ -13,6 +13,8 @@ from semidense.pipeline.plan.plan import Made
 
 SETTLE_SECONDS = 0.3
 """How long the write may take that a task is in when its run ends early and does not wait for it."""
+ANSWER = 10.0
+"""Seconds in which a scheduler must answer at first."""
 PATIENCE = 60.0
 """Seconds without any worker after which a run is given up; one that died is started again in a few."""
 _PAUSE, _LOOK = 0.02, 1.0
@@ -88,7 +90,7 @@ def _connected(address: str) -> Iterator[Any]:
 
     _require_form(address)
     try:
-        client = Client(address, timeout="10s", set_as_default=False)
+        client = Client(address, timeout=ANSWER, set_as_default=False)
     except Exception as error:  # noqa: BLE001 - Dask raises many kinds, its own assertions among them
         raise UsageError(f"no Dask scheduler answers at {address}: {_first_line(error)}") from None
     try:

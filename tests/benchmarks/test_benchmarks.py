@@ -54,7 +54,7 @@ def memory_on_little() -> None:
 
 
 def training_on_little() -> None:
-    training.main(batch=1, patches=4, pairs=1)
+    training.main(batch=1, patches=1, pairs=1)
 
 
 def workers_on_little() -> None:
@@ -82,7 +82,7 @@ def test_runs(
 
 def test_the_matchers_are_told_with_their_errors_and_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("cv2", reason="needs the extra baselines")
-    cost_volume.main(rows=11, crop=(8, 16, 2), pairs=1, install=False, picture=tmp_path / "p.png")
+    cost_volume.main(rows=11, pairs=1, install=False, dataset=TINY, picture=tmp_path / "p.png")
     assert "SGBM" in capsys.readouterr().out
     found = json.loads((tmp_path / "build" / "bench" / "matchers.json").read_text())["matchers"]
     assert all(0 <= each["raw_bad"] <= 100 and each["seconds"] > 0 for each in found.values())

@@ -22,8 +22,10 @@ from tests.faults.tally import Tally
 
 PROJECT = Path(__file__).parents[2]
 FOLDERS = ("pipeline", "stages", "datasets", "cache")
-PER_MODULE, QUICK_PER_MODULE = 40, 12
+PER_MODULE, QUICK_PER_MODULE = 40, 4
 """Tokens and line ends of each module that are changed, and those of the quick form."""
+Place = tuple[int, int, int, str]
+"""A line's number, the columns between which its text is replaced, and the new text."""
 
 
 def changed_ingredients(scale: float) -> Tally:
@@ -159,7 +161,9 @@ def _sources(tally: Tally, most: int) -> None:
         for path in sorted((PROJECT / name).rglob("*.py")):
             text = path.read_text()
             pristine = source_hash(text)
-            for expected, edited, what in _chosen(list(_edits(text)), most, chance):
+            lines = text.splitlines(keepends=True)
+            for expected, place, what in _chosen(list(_edits(text)), most, chance):
+                edited = _spliced(lines, *place)
                 tally.injected += 1
                 try:
                     changed = source_hash(edited) != pristine
@@ -174,21 +178,20 @@ def _chosen(edits: list[Any], most: int, chance: random.Random) -> list[Any]:
     return edits if len(edits) <= most else chance.sample(edits, most)
 
 
-def _edits(text: str) -> Iterator[tuple[bool, str, str]]:
-    """Yield edits: whether the result may change by it, the new text, and what was done."""
-    lines = text.splitlines(keepends=True)
+def _edits(text: str) -> Iterator[tuple[bool, Place, str]]:
+    """Yield edits: whether the result may change by it, what is put where, and what was done."""
     tokens = list(tokenize.generate_tokens(io.StringIO(text).readline))
     texts = _only_text(text)
     for token in tokens:
         (row, start), (last, end) = token.start, token.end
         if token.type == tokenize.NEWLINE:
-            yield False, _spliced(lines, row, start, start, "  # a comment"), f"comment in line {row}"
+            yield False, (row, start, start, "  # a comment"), f"comment in line {row}"
         if row != last or token.type not in (tokenize.NAME, tokenize.NUMBER) or row in texts:
             continue
         if token.type == tokenize.NAME and keyword.iskeyword(token.string):
             continue
         new = f"{token.string}_" if token.type == tokenize.NAME else f"({token.string} + 1)"
-        yield True, _spliced(lines, row, start, end, new), f"{token.string} in line {row}"
+        yield True, (row, start, end, new), f"{token.string} in line {row}"
 
 
 def _only_text(text: str) -> set[int]:

@@ -232,13 +232,20 @@ def _refused(tally: Tally, store: Store, graph: Any, address: str, words: str, w
 
 def _no_workers(tally: Tally) -> None:
     """Run where no worker ever is, and where no scheduler is."""
-    real, clusters.PATIENCE = clusters.PATIENCE, 1.5
+    patience, answer = clusters.PATIENCE, clusters.ANSWER
+    clusters.PATIENCE = 1.5
     try:
         with world.folder() as root, _cluster(0) as address:
             tally.injected += 1
             _refused(tally, Store(root), slow.scenes(1), address, "no worker has been there", "no workers")
+        clusters.ANSWER = 1.5  # nobody listens at these addresses, however long one waits
+        _no_schedulers(tally)
     finally:
-        clusters.PATIENCE = real
+        clusters.PATIENCE, clusters.ANSWER = patience, answer
+
+
+def _no_schedulers(tally: Tally) -> None:
+    """Run where nothing answers."""
     for address in ("tcp://127.0.0.1:9", "nonsense://x", "tcp://", "127.0.0.1", "tcp://127.0.0.1:port", ":", "a b"):
         with world.folder() as root:
             tally.injected += 1
