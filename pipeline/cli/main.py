@@ -7,11 +7,25 @@ from contextlib import suppress
 from typing import Annotated, Any
 
 import typer
+import typer.core
 
 from semidense.pipeline.cli.commands import compare, match, run, show
 from semidense.pipeline.cli.commands.cache.commands import cache_app
 
+
+class _Commands(typer.core.TyperGroup):
+    """The commands; one that fails with EOFError is a fault of the program like any other, not a wish to stop."""
+
+    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401
+        """Run the command; click would say no more than "Aborted!" where a file ended too early."""
+        try:
+            return super().invoke(ctx)
+        except EOFError as error:
+            raise RuntimeError("something that was read ended too early") from error
+
+
 app = typer.Typer(
+    cls=_Commands,
     help="Semi-dense stereo matching with two CNNs; every stage is cached.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,

@@ -244,6 +244,18 @@ def test_shipped_weights_are_used_without_train(invoke: Invoke, weights: Path, t
     )
 
 
+def test_a_file_that_ends_too_early_is_a_fault_and_no_wish_to_stop(
+    invoke: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise EOFError("Compressed file ended before the end-of-stream marker was reached")
+
+    monkeypatch.setattr("semidense.pipeline.api.open_store", fail)
+    with pytest.raises(RuntimeError, match="ended too early") as error:
+        invoke("status", TEST_ONLY)
+    assert "Compressed file" in str(error.value.__cause__)
+
+
 def test_no_command_shows_what_there_is(invoke: Invoke) -> None:
     ran = invoke()
     assert "Usage: pipeline" in ran.out + ran.err
