@@ -249,11 +249,6 @@ def wished(task: Task, wishes: Wishes) -> Task:
     return task
 
 
-def look(task: Task, watch: Watch | None = None, workers: int | None = None) -> Result:
-    """Make the product ``survey`` of every pair."""
-    return run(task, "survey", watch=watch, workers=workers)
-
-
 def match_all(
     task: Task,
     wishes: Wishes,
@@ -266,8 +261,8 @@ def match_all(
     task = wished(task, wishes)
     dataset = task.open()
     task = replace(task, dataset=dataset)
-    others = [look(task, watch, workers)]
-    result = run(task, wishes.product, watch=watch, scheduler=scheduler, workers=workers)
-    if wishes.right_view:
-        others.append(run(task, "right_disparity", watch=watch, scheduler=scheduler, workers=workers))
-    return [Match(scene, wishes, result, tuple(others)) for scene in dataset.scenes]
+    products = ("survey", wishes.product, *(["right_disparity"] if wishes.right_view else []))
+    survey, result, *right = (
+        run(task, product, watch=watch, scheduler=scheduler, workers=workers) for product in products
+    )
+    return [Match(scene, wishes, result, (survey, *right)) for scene in dataset.scenes]

@@ -15,6 +15,7 @@ from plyfile import PlyData
 
 from semidense import pipeline
 from semidense.datasets import DatasetError, open_dataset, read_pfm, read_png16
+from semidense.datasets.pairs.options import PairOptions, pair_spec
 from semidense.pipeline.api import Task, run, status
 from semidense.pipeline.pairs.match import Match, match, match_all
 from semidense.pipeline.pairs.match_files import save, save_all
@@ -300,6 +301,16 @@ def test_the_opencv_users_drop_in(folder: Path, found: Match) -> None:
     assert (matcher.getMinDisparity(), matcher.getNumDisparities()) == (0, 9)
     with pytest.raises(UsageError, match="numDisparities is 0"):
         pipeline.StereoMatcher(0, 0)
+
+
+def test_a_match_on_a_cluster_is_surveyed_there_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    monkeypatch.setattr(
+        "semidense.pipeline.pairs.match.run", lambda _, product, **how: asked.append((product, how["scheduler"]))
+    )
+    spec = pair_spec([str(folder / "left.png"), str(folder / "right.png")], PairOptions())
+    match_all(Task(spec), Wishes(right_view=True), scheduler="tcp://a:1")
+    assert asked == [(product, "tcp://a:1") for product in ("survey", "semidense", "right_disparity")]
 
 
 def test_two_folders_are_not_one_pair(folder: Path, tmp_path: Path) -> None:
