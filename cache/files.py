@@ -29,6 +29,8 @@ _ADVICE = {
     errno.EMFILE: "raise the limit on open files (ulimit -n), or use fewer workers",
     errno.ENFILE: "this machine has too many files open: close some programs",
     errno.ENOMEM: "free some memory, or use fewer workers",
+    errno.EACCES: "check its permissions, or choose another cache folder",
+    errno.EPERM: "check its permissions, or choose another cache folder",
 }
 
 
@@ -53,7 +55,7 @@ def _explaining(path: Path, action: str) -> Iterator[None]:
     except CacheError:
         raise
     except OSError as error:
-        advice = _ADVICE.get(error.errno or 0, "check its permissions, or choose another cache folder")
+        advice = _ADVICE.get(error.errno or 0, "choose another cache folder")
         raise CacheUnavailable(f"cannot {action} the cache at {path}: {error.strerror or error}; {advice}") from error
 
 

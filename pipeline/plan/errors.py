@@ -2,7 +2,8 @@
 
 import difflib
 import errno
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Iterator
 
 from semidense.cache import CacheError
 from semidense.datasets import DatasetError
@@ -35,34 +36,54 @@ _MACHINE_ERRNOS = frozenset(
 )
 _NO_MEMORY = ("allocate memory", "can't start new thread", "failed to map segment", "Cannot allocate")
 """What torch, Python's threads and the loader of libraries say for want of memory."""
+_NO_FILES = (os.strerror(errno.EMFILE),)
+"""What the system says where a process has opened as many files as it may."""
 
 
 def told(error: BaseException) -> str | None:
     """Return one line for an error that the user or the machine can mend; None for a fault of the program."""
     if isinstance(error, USER_ERRORS):
         return str(error)
-    if _lacks_memory(error):
-        return "there is not enough memory: raise its limit (ulimit -v), use fewer --workers, or smaller images"
+    for lacks, line in _LACKING.items():
+        if lacks(error):
+            return line
     if isinstance(error, OSError):
-        reason = error.strerror or str(error)
-        more = "; raise the limit on open files (ulimit -n)" if error.errno == errno.EMFILE else ""
-        return f"{error.filename or 'standard output'}: {reason}{more}"
+        return f"{error.filename or 'standard output'}: {error.strerror or error}"
     return None
 
 
 def told_of_stage(error: Exception) -> str | None:
     """Return one line for an error of a stage that the user or the machine can mend; None for a fault of the stage."""
     machine = isinstance(error, OSError) and error.errno in _MACHINE_ERRNOS
-    return told(error) if isinstance(error, USER_ERRORS) or machine or _lacks_memory(error) else None
+    lacking = any(lacks(error) for lacks in _LACKING)
+    return told(error) if isinstance(error, USER_ERRORS) or machine or lacking else None
 
 
-def _lacks_memory(error: BaseException | None) -> bool:
-    """Return whether an error, or what it came from, says so."""
+def _lacks_memory(error: BaseException) -> bool:
+    return any(isinstance(each, MemoryError) or _says(each, _NO_MEMORY) for each in _chain(error))
+
+
+def _lacks_files(error: BaseException) -> bool:
+    """Return whether an error came from the limit on open files; a library that is not found may hide it."""
+    return any(_says(each, _NO_FILES) for each in _chain(error))
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an error and what it came from."""
     while error is not None:
-        if isinstance(error, MemoryError) or any(words in str(error) for words in _NO_MEMORY):
-            return True
+        yield error
         error = error.__cause__ or error.__context__
-    return False
+
+
+def _says(error: BaseException, words: Iterable[str]) -> bool:
+    return any(each in str(error) for each in words)
+
+
+_LACKING = {
+    _lacks_memory: "there is not enough memory: raise its limit (ulimit -v), use fewer --workers, or smaller images",
+    _lacks_files: "too many files are open at once: raise the limit (ulimit -n), or use fewer --workers",
+}
+"""What the machine may lack, and the line that says so."""
 
 
 def nearest(name: str, known: Iterable[str], prefix: str = "") -> str:

@@ -19,6 +19,9 @@ from semidense.cache.files import in_threads, make_folder, remove, walk, write_s
         (errno.EACCES, "Permission denied; check its permissions"),
         (errno.ENOTDIR, "choose another cache folder"),
         (errno.EFBIG, "File too large; raise the limit"),
+        (errno.EMFILE, "Too many open files; raise the limit on open files"),
+        (errno.EPERM, "Operation not permitted; check its permissions"),
+        (errno.ESTALE, "Stale file handle; choose another cache folder"),
     ],
 )
 def test_failures_are_explained_in_one_line(number: int, advice: str) -> None:
