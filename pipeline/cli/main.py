@@ -11,6 +11,7 @@ import typer.core
 
 from semidense.pipeline.cli.commands import compare, match, run, show
 from semidense.pipeline.cli.commands.cache.commands import cache_app
+from semidense.stages.compute.allocator import keep_freed_memory
 
 
 class _Commands(typer.core.TyperGroup):
@@ -69,6 +70,7 @@ def main() -> None:
     _require_streams()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)
+    keep_freed_memory()
     try:
         try:
             app(prog_name="pipeline")

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from semidense.cache import Draft, Store
 from semidense.pipeline.execution.claims import Claims
 from semidense.pipeline.execution.proof import require_same
@@ -14,6 +16,7 @@ from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.plan.errors import StageFailed, StageRefused, told_of_stage
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.steps import Step
+from semidense.stages.compute.allocator import keep_freed_memory
 from semidense.stages.stage import Array
 
 Span = tuple[float, float]
@@ -65,6 +68,28 @@ def _bytes(arrays: dict[str, Array]) -> int:
     return sum(array.nbytes for array in arrays.values())
 
 
+class Unread(Mapping[str, Array]):
+    """The arrays of an entry by name, each read from the cache whenever it is asked for; none is kept."""
+
+    def __init__(self, store: Store, key: str) -> None:
+        self._store, self._key = store, key
+
+    def __getitem__(self, name: str) -> Array:
+        """Return an array, in memory.
+
+        Raises:
+            KeyError: if there is none of this name.
+            CacheError: if the entry is missing or damaged.
+        """
+        return np.asarray(self._store.arrays(self._key)[name][...])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._store.arrays(self._key))
+
+    def __len__(self) -> int:
+        return len(self._store.arrays(self._key))
+
+
 @dataclass(frozen=True)
 class Context:
     """What every task is given.
@@ -86,13 +111,14 @@ class Context:
     runner: Mapping[str, str] | None = None
 
     def admit(self, step: Step) -> None:
-        """Refuse to work on a step in a process that would make another result.
+        """Refuse to work on a step in a process that would make another result; make a worker's process ready for it.
 
         Raises:
             UsageError: naming what differs here.
         """
         if self.runner is not None:
             require_same(step, self.runner)
+            keep_freed_memory()
 
 
 @dataclass(frozen=True)

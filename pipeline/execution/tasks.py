@@ -21,7 +21,7 @@ from semidense.cache import (
     require_imported_as_hashed,
 )
 from semidense.pipeline.execution.checkpoints import Checkpoints
-from semidense.pipeline.execution.jobs import Context, Job, Span, explained
+from semidense.pipeline.execution.jobs import Context, Job, Span, Unread, explained
 from semidense.pipeline.execution.tiles import Rows, read_block, trim
 from semidense.pipeline.plan.environment import cpu_name, version
 from semidense.pipeline.plan.errors import StageFailed
@@ -236,11 +236,10 @@ def provenance(command: Sequence[str]) -> dict[str, Any]:
 def _read_whole(
     context: Context, step: Step, product: str, keys: Sequence[str]
 ) -> Mapping[str, Any] | Sequence[Arrays]:
-    """Return a product's arrays, unread if the stage asks for it; where a split step takes one a scene, a list."""
-    if product in step.stage.lazy:
-        return context.store.arrays(keys[0])
-    arrays = [context.recent.read(context.store, key) for key in keys]
-    return arrays if step.takes_list(product) else arrays[0]
+    """Return a product's arrays, unread if the stage asks for it; where a split step takes one a scene, unread ones."""
+    if step.takes_list(product):
+        return [Unread(context.store, key) for key in keys]
+    return context.store.arrays(keys[0]) if product in step.stage.lazy else context.recent.read(context.store, keys[0])
 
 
 def _create(draft: Draft, output: Output, shape: Sequence[int], dtype: str, tile_rows: int | None) -> None:

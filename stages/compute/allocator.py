@@ -2,6 +2,10 @@
 
 By default glibc gives each large array back to the system when it is freed, and gets the next one
 page by page. On virtual machines these page faults cost up to a third of a training step.
+
+The settings cannot be taken back: glibc does not tell the earlier ones, and setting a threshold ends its own
+adjusting of it for good. So no stage asks for them. The command line and the workers of a cluster do, whose processes
+are ours; in a notebook or a program of your own it is your choice.
 """
 
 import ctypes
@@ -15,7 +19,7 @@ _NEVER_TRIM = 2**31 - 1
 
 @cache
 def keep_freed_memory() -> bool:
-    """Tell glibc to keep freed memory for reuse, in one arena for all threads.
+    """Tell glibc to keep freed memory for reuse, in one arena for all threads, as long as this process lives.
 
     Returns:
         Whether this C library took the settings; elsewhere nothing changes but the speed.

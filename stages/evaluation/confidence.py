@@ -4,7 +4,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from semidense.stages.compute.allocator import keep_freed_memory
 from semidense.stages.compute.precision import Precision, autocast
 from semidense.stages.compute.threads import one_thread
 from semidense.stages.evaluation.agreement import padded_agreement
@@ -40,7 +39,6 @@ def padded_log_odds(
     net: EvaluationNet, layers: NDArray[np.float32], precision: Precision = "float32", flipped: bool = False
 ) -> NDArray[np.float32]:
     """Return the log-odds of ``confidence``, of layers (layer, y + 100, x + 100) with 50 px of context all round."""
-    keep_freed_memory()
     with torch.inference_mode(), autocast(precision):
         maps = torch.from_numpy(np.ascontiguousarray(layers)).unsqueeze(0)
         log_odds = net.dense(maps.contiguous(memory_format=torch.channels_last))

@@ -20,12 +20,10 @@ from semidense.stages.evaluation.layers import evaluation_layers
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.augmentation import relight
 from semidense.stages.learning.parameters import initialise, to_vector
+from semidense.stages.learning.scenes import Scenes
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import balanced_cross_entropy, fit
 from semidense.stages.stage import DisparityMap, Images, Monitor, Network, Silent, by_scene
-
-Sides = tuple[NDArray[np.float32], NDArray[np.float32]]
-"""The layers (layer, y, x) of the left view and its map, and of the right view and its map, mirrored."""
 
 
 def train_evaluation_net(params: EvaluationNetParams, inputs: ScoredScenes, monitor: Monitor | None = None) -> Network:
@@ -39,8 +37,8 @@ def train_evaluation_net(params: EvaluationNetParams, inputs: ScoredScenes, moni
     Returns:
         ``parameters`` float32 (parameter,) and ``loss`` float32 (step,).
     """
-    products = by_scene(inputs["images"], "images"), inputs["disparity"], inputs["right_disparity"]
-    scenes = [_sides(*scene) for scene in zip(*products, strict=True)]
+    images, left, right = by_scene(inputs["images"], "images"), inputs["disparity"], inputs["right_disparity"]
+    scenes = Scenes(lambda scene: _sides(images[scene], left[scene], right[scene]), len(images))
     net = EvaluationNet().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     initialise(net, params.seed)
     samples = inputs["evaluation_samples"]
@@ -73,18 +71,18 @@ def _undo_the_balance(net: EvaluationNet, labels: NDArray[np.int8]) -> None:
             net.out.bias[1] += np.log(right / wrong)
 
 
-def _sides(images: Images, left: DisparityMap, right: DisparityMap) -> Sides:
-    """Return the layers of one scene, upright and mirrored."""
+def _sides(images: Images, left: DisparityMap, right: DisparityMap) -> NDArray[np.float32]:
+    """Return the layers of one scene: (side, layer, y, x), upright, and of the right view and its map, mirrored."""
     upright = evaluation_layers(images["left"], images["moments"][0], left["disparity"])
     mirrored = evaluation_layers(images["right"], images["moments"][1], right["disparity"])[:, :, ::-1]
-    return upright, mirrored
+    return np.stack([upright, mirrored])
 
 
 def cut_crop(
     params: EvaluationNetParams,
     samples: EvaluationSamples,
     index: int,
-    scenes: Sequence[Sides],
+    scenes: Sequence[NDArray[np.float32]] | Scenes,
     rng: np.random.Generator,
 ) -> NDArray[np.float32]:
     """Cut out what the grid of one sample depends on; beyond the image the nearest pixel, as in inference.

@@ -17,7 +17,6 @@ from safetensors.torch import save as save_tensors
 from torch import Tensor, nn
 from torch.nn import functional
 
-from semidense.stages.compute.allocator import keep_freed_memory
 from semidense.stages.compute.threads import keep_one_thread
 from semidense.stages.learning.optimiser import optimisers_of
 from semidense.stages.learning.schedule import SHARDS, Schedule
@@ -56,7 +55,6 @@ def fit(net: nn.Module, loss: Loss, schedule: Schedule, monitor: Monitor) -> NDA
     Raises:
         StageError: if the loss or its gradient is not finite.
     """
-    keep_freed_memory()
     parameters = list(net.parameters())
     optimisers = optimisers_of(net, schedule)
     curve = _resume(net, optimisers, monitor.load())

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from semidense.stages.compute.allocator import keep_freed_memory
 from semidense.stages.compute.precision import Precision, autocast, dtype_of
 from semidense.stages.compute.threads import one_thread
 from semidense.stages.matching.declaration import RADIUS, CostVolumeParams, OfNetworks
@@ -79,7 +78,6 @@ def padded_cost_volume(
     require_views(net, channels)
     height, width = (length - 2 * RADIUS for length in channels.shape[2:])
     volume = np.full((height, width, len(disparities)), np.nan, np.float32)
-    keep_freed_memory()
     with torch.inference_mode():
         views = torch.from_numpy(np.ascontiguousarray(channels))
         costs = (_transformed if is_transformable(net) else _direct)(net, views, precision)

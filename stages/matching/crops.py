@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from semidense.stages.learning.augmentation import relight
+from semidense.stages.learning.scenes import Scenes
 from semidense.stages.learning.training import balanced_cross_entropy
 from semidense.stages.matching.declaration import RADIUS, MatchingSamples
 from semidense.stages.matching.samples import ABSENT
 
 IGNORED = -1
+Channels = Sequence[NDArray[np.float32]] | Scenes
+"""The channels of each training scene: float32 (view, channel, y, x)."""
 
 
 class Scaled(Protocol):
@@ -29,12 +32,18 @@ class Scaled(Protocol):
     input_std: Tensor
 
 
-def measure_channels(net: Scaled, scenes: Sequence[NDArray[np.float32]]) -> None:
+def measure_channels(net: Scaled, scenes: Channels) -> None:
     """Give the net the mean and the standard deviation of each channel over the training scenes."""
-    means = np.mean([scene.mean((0, 2, 3), dtype=np.float64) for scene in scenes], 0)
-    squares = np.mean([np.square(scene, dtype=np.float64).mean((0, 2, 3)) for scene in scenes], 0)
+    moments = [_moments(scenes[number]) for number in range(len(scenes))]
+    means, squares = np.mean([mean for mean, _ in moments], 0), np.mean([square for _, square in moments], 0)
     net.input_mean.copy_(torch.from_numpy(means))
     net.input_std.copy_(torch.from_numpy(np.sqrt(np.maximum(squares - means**2, 1e-8))))
+
+
+def _moments(scene: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the mean of each channel of a scene and that of its squares."""
+    mean: NDArray[np.float64] = scene.mean((0, 2, 3), dtype=np.float64)
+    return mean, np.square(scene, dtype=np.float64).mean((0, 2, 3))
 
 
 class Crop:
@@ -50,7 +59,7 @@ class Crop:
 def cut_crop(
     samples: MatchingSamples,
     index: int,
-    scenes: Sequence[NDArray[np.float32]],
+    scenes: Channels,
     strength: float,
     rng: np.random.Generator,
     slots: NDArray[np.int32] | None = None,

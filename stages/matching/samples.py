@@ -102,6 +102,12 @@ class _Scene:
     params: MatchingSamplesParams
 
     @cached_property
+    def range(self) -> tuple[int, int]:
+        """Smallest and largest disparity, px."""
+        low, high = self.truth["range"]
+        return int(low), int(high)
+
+    @cached_property
     def upright(self) -> _Side:
         return _Side.of(visible_truth(self.truth, mirrored=False), self.params.crop)
 
@@ -134,9 +140,8 @@ def _draw(scene: _Scene, rng: np.random.Generator) -> _Drawn:
     y, x = side.corner(params.crop, rng)
     crop = side.visible[y : y + params.crop[0], x : x + params.crop[1]]
     known = crop[np.isfinite(crop)]
-    low, high = (int(bound) for bound in scene.truth["range"])
     pick = _patch_slots if params.form == "patch" else _dense_slots
-    slots = pick(known, low, high, params.disparities, rng)
+    slots = pick(known, *scene.range, params.disparities, rng)
     truth = np.ascontiguousarray(crop, np.float32)
     return _Drawn(side is scene.mirrored, y, x, slots.astype(np.int32), truth)
 

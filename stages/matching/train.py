@@ -14,6 +14,7 @@ from torch.nn import functional
 
 from semidense.stages.compute.precision import Precision, autocast
 from semidense.stages.learning.parameters import initialise, to_vector
+from semidense.stages.learning.scenes import Scenes
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import fit
 from semidense.stages.matching.crops import Crop, cells_loss, cut_crop, measure_channels
@@ -37,7 +38,8 @@ def train_matching_net(params: MatchingNetParams, inputs: OfSamples, monitor: Mo
     Returns:
         ``parameters`` float32 (parameter,) and ``loss`` float32 (step,).
     """
-    scenes = [scene["channels"] for scene in by_scene(inputs["channels"], "channels")]
+    products = by_scene(inputs["channels"], "channels")
+    scenes = Scenes(lambda scene: products[scene]["channels"], len(products))
     net = MatchingNet(scenes[0].shape[1], params.head).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     initialise(net, params.seed)
     measure_channels(net, scenes)

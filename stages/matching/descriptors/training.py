@@ -12,6 +12,7 @@ from torch import Tensor
 
 from semidense.stages.compute.precision import Precision, autocast
 from semidense.stages.learning.parameters import initialise, to_vector
+from semidense.stages.learning.scenes import Scenes
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import fit
 from semidense.stages.matching.crops import Crop, cells_loss, cut_crop, measure_channels
@@ -35,12 +36,13 @@ def train_descriptor_net(params: DescriptorNetParams, inputs: OfSamples, monitor
     Returns:
         ``parameters`` float32 (parameter,) and ``loss`` float32 (step,).
     """
-    scenes = [scene["channels"] for scene in by_scene(inputs["channels"], "channels")]
+    products = by_scene(inputs["channels"], "channels")
+    scenes = Scenes(lambda scene: products[scene]["channels"], len(products))
     net = DescriptorNet(scenes[0].shape[1]).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     initialise(net, params.seed)
     measure_channels(net, scenes)
     samples = inputs["matching_samples"]
-    slots = [_range(samples, scene) for scene in range(len(scenes))]
+    slots = {int(scene): _range(samples, scene) for scene in np.unique(samples["scene"])}
 
     def loss(step: int, shard: int) -> Tensor:
         rng = np.random.default_rng((params.seed, step, shard))

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from semidense.stages.compute.allocator import keep_freed_memory
 from semidense.stages.compute.precision import Precision, dtype_of
 from semidense.stages.compute.threads import one_thread
 from semidense.stages.matching.declaration import REACH
@@ -53,7 +52,6 @@ def padded_fast_costs(
         raise StageError(f"descriptor-Net expects 2 views of {net.channels} channels, got {channels.shape[:2]}")
     height, width = (length - 2 * REACH for length in channels.shape[2:])
     volume = np.empty((height, width, len(disparities)), np.float32)
-    keep_freed_memory()
     with torch.inference_mode():
         left, right = _descriptors(net, torch.from_numpy(np.ascontiguousarray(channels)), precision)
         smallest, largest = disparities[0], disparities[-1]

@@ -11,7 +11,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from semidense.stages.compute.allocator import keep_freed_memory
 from semidense.stages.compute.precision import Precision
 from semidense.stages.compute.threads import one_thread
 from semidense.stages.matching.declaration import MARGIN, RADIUS
@@ -60,7 +59,6 @@ def padded_guided_costs(
     chosen = candidates(proposing, disparities.start, votes)
     volume = np.full((*(TILE * count for count in chosen.shape[:2]), len(disparities)), np.nan, np.float32)
     tiles = volume.reshape(chosen.shape[0], TILE, chosen.shape[1], TILE, len(disparities))
-    keep_freed_memory()
     with torch.inference_mode():
         own = slice(MARGIN - RADIUS, RADIUS - MARGIN)
         judge = judge_tiles(net, torch.from_numpy(np.ascontiguousarray(channels[:, :, own, own])), precision)

@@ -6,7 +6,7 @@ import pytest
 
 from semidense.cache import DamagedEntry, Recipe, Store
 from semidense.pipeline.execution import jobs as recent
-from semidense.pipeline.execution.jobs import Recent
+from semidense.pipeline.execution.jobs import Recent, Unread
 
 
 def publish(store: Store, value: float, size: int = 4) -> str:
@@ -68,3 +68,20 @@ def test_travels_empty(tmp_path: Path) -> None:
     store, kept = Store(tmp_path), Recent()
     kept.read(store, publish(store, 1.5))
     assert not pickle.loads(pickle.dumps(kept))._kept
+
+
+def test_an_unread_product_reads_what_is_asked_for_and_keeps_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, real = Store(tmp_path), Store.arrays
+    opened: list[str] = []
+    monkeypatch.setattr(Store, "arrays", lambda self, key: opened.append(key) or real(self, key))
+    key = publish(store, 1.5)
+    product = Unread(store, key)
+    assert opened == []
+    for _ in range(2):
+        assert product["map"].tolist() == [1.5] * 4
+    assert opened == [key] * 2
+    assert list(product) == ["map"] and len(product) == 1
+    with pytest.raises(KeyError):
+        product["mop"]

@@ -4,6 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from semidense.cache import code_parts
+from semidense.stages.catalog import STAGES
 from semidense.stages.compute.allocator import keep_freed_memory
 
 ask = keep_freed_memory.__wrapped__
@@ -45,3 +47,9 @@ def test_other_systems_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_is_harmless_here_and_asked_once() -> None:
     assert keep_freed_memory() is keep_freed_memory()
     assert keep_freed_memory.cache_info().currsize == 1
+
+
+@pytest.mark.parametrize("product", sorted(STAGES))
+def test_no_stage_asks_for_it(product: str) -> None:
+    """It cannot be taken back, and a stage may run in a notebook."""
+    assert "semidense.stages.compute.allocator" not in code_parts(STAGES[product].module, ("semidense",))

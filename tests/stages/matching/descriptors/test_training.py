@@ -61,6 +61,27 @@ def test_makes_what_it_declares_and_one_seed_makes_it_again() -> None:
     assert len(one["loss"]) == 4
 
 
+def of_two_scenes(samples: int) -> dict[str, object]:
+    both = [shifted_scene(seed=seed) for seed in (0, 1)]
+    params = MatchingSamplesParams(samples=samples, height=5, width=8, slots=4)
+    drawn = draw_samples(params, {"truth": [scene["truth"] for scene in both]})
+    return {"channels": [scene["channels"] for scene in both], "matching_samples": drawn}
+
+
+def test_a_scene_without_a_sample_is_not_needed() -> None:
+    given = of_two_scenes(samples=1)
+    assert len(np.unique(given["matching_samples"]["scene"])) == 1
+    assert np.isfinite(train_descriptor_net(settings(steps=1), given)["parameters"]).all()
+
+
+def test_scenes_for_which_there_is_no_room_are_read_again_and_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = of_two_scenes(samples=8)
+    roomy = train_descriptor_net(settings(steps=3), given)
+    monkeypatch.setattr("semidense.stages.learning.scenes.MOST_BYTES", 0)
+    narrow = train_descriptor_net(settings(steps=3), given)
+    assert all(np.array_equal(roomy[name], narrow[name]) for name in roomy)
+
+
 def test_a_training_that_was_killed_ends_as_an_undisturbed_one() -> None:
     given, params = inputs(shifted_scene()), settings(steps=5, checkpoint_steps=2)
     expected = train_descriptor_net(params, given)

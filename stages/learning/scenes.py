@@ -1,0 +1,51 @@
+"""What a training needs of its scenes: made when a sample asks for it, and kept as long as there is room."""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+MOST_BYTES = 1 << 30
+"""What is kept at most: enough for the 29 Middlebury scenes of a third of the size; more scenes are made again."""
+
+
+class Scenes:
+    """One array a training scene, by the scene's number; those that were asked for last are kept.
+
+    Args:
+        make: returns the array of a scene; the same for the same number, so that nothing depends on what was kept.
+        count: how many scenes there are.
+    """
+
+    def __init__(self, make: Callable[[int], NDArray[np.float32]], count: int) -> None:
+        self._make, self._count = make, count
+        self._kept: OrderedDict[int, NDArray[np.float32]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, scene: int) -> NDArray[np.float32]:
+        """Return the array of a scene.
+
+        Raises:
+            IndexError: if there is no such scene.
+        """
+        if not 0 <= scene < self._count:
+            raise IndexError(scene)
+        with self._lock:
+            found = self._kept.pop(scene, None)
+            if found is not None:
+                self._kept[scene] = found
+        return self._add(scene) if found is None else found
+
+    def _add(self, scene: int) -> NDArray[np.float32]:
+        """Make the array of a scene, without the lock, and drop those that were not asked for for longest."""
+        made = self._make(scene)
+        with self._lock:
+            self._kept[scene] = made
+            while len(self._kept) > 1 and sum(each.nbytes for each in self._kept.values()) > MOST_BYTES:
+                self._kept.popitem(last=False)
+        return made
