@@ -17,6 +17,7 @@ NAMES = (
     "growth",
     "workers",
     "cached_run",
+    "many_scenes",
     "sweep",
     "memory",
 )

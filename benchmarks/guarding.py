@@ -32,6 +32,7 @@ LONG = 1.0
 """Seconds from which on a stage is held to the target; shorter ones count in the whole."""
 GUARDS = (
     "semidense.cache.store.inspect",
+    "semidense.cache.store.inspect_data",
     "semidense.cache.entries.publish.inspect",
     "semidense.cache.entries.publish.remove_strays",
     "semidense.cache.entries.publish.seal",

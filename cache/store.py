@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from semidense.cache.document import plain_mapping
 from semidense.cache.entries import publish
-from semidense.cache.entries.check import Finding, Policy, inspect, read_record
+from semidense.cache.entries.check import Finding, Policy, inspect, inspect_data, read_record
 from semidense.cache.entries.draft import Draft, hold
 from semidense.cache.entries.entry import Entry
 from semidense.cache.entries.quarantine import set_aside_if_damaged
@@ -93,6 +93,29 @@ class Store:
         except (EntryNotFound, DamagedEntry) as error:
             return str(error)
         return None
+
+    def has(self, key: str) -> bool:
+        """Return whether there is a record of ``key``; reads nothing.
+
+        Raises:
+            InvalidKey: if ``key`` is not one.
+        """
+        return self.layout.record(key).is_file()
+
+    def look(self, key: str) -> tuple[Entry | None, str | None]:
+        """Return what ``find`` does, and of an entry that is there what ``check`` does; its record is read once.
+
+        Raises:
+            InvalidKey: if ``key`` is not one.
+            CacheUnavailable: if the file system refuses.
+        """
+        if (entry := self.find(key)) is None:
+            return None, None
+        try:
+            inspect_data(self.layout, entry, self.verify)
+        except DamagedEntry as error:
+            return entry, str(error)
+        return entry, None
 
     def require(self, key: str) -> Entry:
         """Return the entry of ``key``, checked as the policy says; a damaged one is moved to quarantine.

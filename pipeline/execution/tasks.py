@@ -66,14 +66,11 @@ def _begin_claimed(
 
 def _find(context: Context, step: Step, recipe: Recipe) -> Made | None:
     """Return a step's result if it is there and sound; this very run may have made it."""
-    store, run = context.store, context.claims.lease.name
-    if store.find(recipe.key) is None or store.check(recipe.key) is not None:
+    run = context.claims.lease.name
+    entry, damage = context.store.look(recipe.key)
+    if entry is None or damage:
         return None
-    try:
-        entry = store.require(recipe.key)
-        return Made(step, entry.key, entry.digest, entry.seconds, reused=run is None or entry.extras.get("run") != run)
-    except (EntryNotFound, DamagedEntry):  # it went between two looks
-        return None
+    return Made(step, entry.key, entry.digest, entry.seconds, reused=run is None or entry.extras.get("run") != run)
 
 
 def _set_damaged_aside(store: Store, key: str) -> None:

@@ -139,8 +139,7 @@ class _Planner:
         if open_inputs:
             return self._not_there(step, None, self._pending(step, open_inputs))
         recipe = step.recipe(self.digests)
-        entry = self.store.find(recipe.key)
-        damage = self.store.check(recipe.key) if entry else None
+        entry, damage = self.store.look(recipe.key)
         if entry is None or damage or step.product in self.forced:
             changes = (Change("forced", ABSENT, step.product),) if entry and not damage else None
             return self._not_there(step, recipe, changes or self._changes(step, recipe), damage)

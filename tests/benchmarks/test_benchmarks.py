@@ -16,6 +16,7 @@ from benchmarks import (
     cost_volume,
     growth,
     low_rank,
+    many_scenes,
     memory,
     peers,
     recipe,
@@ -49,6 +50,10 @@ def growth_on_little() -> None:
     growth.main(shrink=4, pairs=1)
 
 
+def many_scenes_on_little() -> None:
+    many_scenes.main(scenes=3)
+
+
 def memory_on_little() -> None:
     memory.main(size=["48x64x4"])
 
@@ -66,6 +71,7 @@ def workers_on_little() -> None:
     [
         pytest.param(aggregation_on_little, "aggregation", "peak of aggregation", id="aggregation"),
         pytest.param(growth_on_little, "growth", "time a cell", id="growth"),
+        pytest.param(many_scenes_on_little, "many_scenes", "explain --trace", id="many scenes"),
         pytest.param(memory_on_little, "memory", "peak of a run", id="memory"),
         pytest.param(training_on_little, "training", "times patches", id="training"),
         pytest.param(workers_on_little, "workers", "two workers", id="workers"),

@@ -23,6 +23,8 @@ from semidense.cache.files import walk
 
 def test_an_empty_cache_answers_and_makes_nothing(store: Store, recipe: Recipe) -> None:
     assert store.find(recipe.key) is None
+    assert store.look(recipe.key) == (None, None)
+    assert not store.has(recipe.key)
     assert "no entry has the key" in str(store.check(recipe.key))
     assert list(store.entries()) == []
     assert store.history({}) == []
@@ -36,6 +38,8 @@ def test_what_was_published_is_found(store: Store, make: Callable[..., Entry], r
     entry = make(store)
     assert store.find(recipe.key) == store.require(recipe.key) == entry
     assert store.check(recipe.key) is None
+    assert store.look(recipe.key) == (entry, None)
+    assert store.has(recipe.key)
     assert (entry.label, entry.seconds, entry.extras) == (
         {"product": "square", "scene": "Teddy"},
         1.5,
@@ -45,11 +49,26 @@ def test_what_was_published_is_found(store: Store, make: Callable[..., Entry], r
     assert store.layout.record(recipe.key) == store.root / "records" / recipe.key[:2] / f"{recipe.key}.json"
 
 
+def test_a_look_finds_what_is_damaged_and_says_so(store: Store, make: Callable[..., Entry], recipe: Recipe) -> None:
+    entry = make(store)
+    chunk = next(path for path in sorted(store.layout.entry(recipe.key).rglob("*")) if path.parent.name == "c")
+    chunk = next(path for path in sorted(chunk.rglob("*")) if path.is_file()) if chunk.is_dir() else chunk
+    chunk.chmod(0o644)
+    chunk.write_bytes(b"")
+    found, damage = store.look(recipe.key)
+    assert found == entry
+    assert damage == store.check(recipe.key)
+    assert "has 0 bytes" in str(damage)
+    store.layout.record(recipe.key).chmod(0o644)
+    store.layout.record(recipe.key).write_bytes(b"{}")
+    assert store.look(recipe.key) == (None, None), "a record that cannot be read names no entry"
+
+
 @pytest.mark.parametrize(
     "key", ["", "x", "../" * 20, "A" * 64, "0" * 63, "0" * 65, "0" * 64 + "\n", "/etc/passwd", "\u0660" * 64]
 )
 def test_keys_are_never_paths(store: Store, key: str) -> None:
-    for ask in (store.find, store.check, store.require, store.open, store.claim, store.claimant):
+    for ask in (store.find, store.check, store.look, store.has, store.require, store.open, store.claim, store.claimant):
         with pytest.raises(InvalidKey, match="is not a key"):
             ask(key)
 

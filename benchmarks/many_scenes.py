@@ -1,0 +1,83 @@
+"""Planning and running a data set of many scenes that are all cached: ``python -m benchmarks.many_scenes``.
+
+One tiny scene is matched. The products of all scenes are published as copies of its arrays that differ in two bytes, so
+that the cache has as many entries as it would have. Nothing is computed in what is timed.
+"""
+
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from benchmarks.harness import Ratio, report, timed
+from semidense.cache import Store
+from semidense.pipeline.api import Task, open_store, run, status
+from semidense.pipeline.cli.commands.cache.cleaning import Wish
+from semidense.pipeline.plan.building import build
+from semidense.pipeline.plan.steps import SPLIT, Step
+from semidense.pipeline.results.provenance import ancestry
+
+SECONDS = {"status": 4.0, "run": 5.0, "cache gc --keep": 5.0, "explain --trace": 4.0}
+"""What each command may take at 500 scenes."""
+
+
+def fill(task: Task, donor: Task) -> None:
+    """Publish every product that a run of ``task`` makes, with the arrays of the one scene of ``donor``."""
+    made = run(donor)
+    arrays = {each.step.product: made.store.read(each.key) for each in made.made.values()}
+    store, digests = open_store(task.cache), dict[str, str]()
+    for number, step in enumerate(build(task.request("metrics")).steps.values()):
+        changed = arrays[step.product] if step.scene == SPLIT else marked(arrays[step.product], number)
+        digests[step.id] = publish(store, step, digests, changed)
+
+
+def marked(arrays: dict[str, NDArray[np.generic]], number: int) -> dict[str, NDArray[np.generic]]:
+    """Return arrays of which one holds a number in its first two bytes."""
+    name = max(arrays, key=lambda each: arrays[each].nbytes)
+    copy = np.ascontiguousarray(arrays[name]).copy()
+    copy.reshape(-1).view(np.uint8)[:2] = np.frombuffer(number.to_bytes(2, "little"), np.uint8)
+    return {**arrays, name: copy}
+
+
+def publish(store: Store, step: Step, digests: dict[str, str], arrays: dict[str, NDArray[np.generic]]) -> str:
+    """Publish arrays as a step's product and return its digest."""
+    draft = store.begin(step.recipe(digests), step.label)
+    for name, array in arrays.items():
+        dims = [f"{name}{axis}" for axis in range(array.ndim)]
+        draft.create_array(name, array.shape, str(array.dtype), [max(1, length) for length in array.shape], dims, {})
+        draft.write(name, tuple(slice(0, length) for length in array.shape), array)
+    return draft.publish(0.0, {}).digest
+
+
+def spec(scenes: int) -> str:
+    """Return a data set of so many tiny scenes."""
+    return f"synthetic:train=0,test={scenes},height=48,width=64,disparities=4"
+
+
+def main(scenes: Annotated[int, typer.Option(help="scenes of the data set")] = 500) -> None:
+    """Fill a cache, then time each command over it once, in this process, its imports done before."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        task = Task(spec(scenes), cache=Path(folder, "cache"))
+        fill(task, Task(spec(1), cache=Path(folder, "donor")))
+        key = str(status(task).steps[-1].key)
+        sides = {
+            "status": lambda: status(task),
+            "run": lambda: run(task),
+            "cache gc --keep": lambda: Wish(keep=(spec(scenes),)).limits(Path(folder, "cache")),
+            "explain --trace": lambda: ancestry(open_store(task.cache), key),
+        }
+        seconds = {name: timed(side) for name, side in sides.items()}
+    report(
+        "many_scenes",
+        [
+            Ratio(f"{name}, {scenes} scenes, all cached, s", (found,), SECONDS[name] * scenes / 500, at_most=True)
+            for name, found in seconds.items()
+        ],
+    )
+
+
+if __name__ == "__main__":
+    typer.run(main)
