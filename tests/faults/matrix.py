@@ -45,7 +45,7 @@ ROWS = (
     Row(13, "workers with other code than the run", workers.other_code, 0.2),
     Row(14, "input files replaced between planning and reading, and put back", changes.replaced_inputs, 0.5),
     Row(15, "modules edited around their import", changes.edited_modules, 0.5),
-    Row(16, "workers and schedulers killed during a run on a cluster", workers.killed_workers, 0.05),
+    Row(16, "workers and schedulers killed during a run on a cluster", workers.killed_workers, 0.03),
     Row(17, "sweeping and cleaning beside living runs that no process id tells of", changes.living_runs, 0.2),
     Row(18, "folders, files and links of the user's own in the cache's place", changes.folders_of_others, 1),
     Row(19, "URLs as caches", changes.urls, 1),

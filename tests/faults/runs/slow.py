@@ -8,7 +8,8 @@ from semidense.pipeline.plan.steps import Graph, Step
 from semidense.stages.stage import Arrays, Inputs
 from tests.pipeline import toy
 
-SECONDS = 0.25
+SECONDS = 0.6
+"""A run of eight scenes then takes several times as long as a worker that was killed takes to be there again."""
 
 
 def make_ramp(start: int, inputs: Inputs) -> Arrays:
