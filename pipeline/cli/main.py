@@ -10,6 +10,7 @@ import typer
 
 from semidense.pipeline.cli.commands import compare, match, run, show
 from semidense.pipeline.cli.commands.cache.commands import cache_app
+from semidense.pipeline.cli.commands.data import commands as data
 
 app = typer.Typer(
     help="Semi-dense stereo matching with two CNNs; every stage is cached.",
@@ -37,7 +38,7 @@ def _options(
     """Take the options that stand before a command."""
 
 
-for commands in (run, match, compare, show):
+for commands in (run, match, compare, show, data):
     commands.register(app)
 app.add_typer(cache_app, name="cache")
 
