@@ -65,7 +65,7 @@ def _patches(image: Gray, rows: NDArray[np.intp], centres: Gray) -> Gray:
     part = (centres - low)[:, None, None].astype(np.float32)
     y, x = rows[:, None, None] + step[:, None], low[:, None, None] + step
     found = image[y, x] * (1 - part) + image[y, x + 1] * part
-    return found.reshape(rows.size, -1)
+    return found.reshape(rows.size, step.size**2)
 
 
 def _mean_correlation(patches: Gray, right: Gray, rows: NDArray[np.intp], landing: Gray) -> float:

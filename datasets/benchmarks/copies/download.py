@@ -18,7 +18,8 @@ LARGEST = 8 << 30
 Watch: TypeAlias = Callable[[int, int | None], None]
 """Told how many bytes are here, and how many there will be if that is known."""
 _CONNECT_SECONDS, _SILENT_SECONDS = 10, 60
-_CHUNK = 1 << 18
+_CHUNK = 1 << 16
+"""Bytes that are written at once: less is lost when the connection breaks."""
 _TRIES = 10
 """How often a download is resumed, if each time brings something new."""
 
