@@ -25,7 +25,7 @@ Source: https://vision.middlebury.edu/stereo/
 
 import itertools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from semidense.datasets.benchmarks import middlebury_pfm, middlebury_png
@@ -85,16 +85,16 @@ def _sources(folder: Path, name: str, wanted: Mapping[str, str]) -> Iterator[Sce
         yield module.source(folder, f"{name}@{condition}" if condition else name, views)
 
 
-def _chosen(folder: Path, role: str, wanted: str | None, pictures: Mapping[tuple[str, str], Path]) -> list[str | None]:
-    there: list[str | None] = sorted(condition for view, condition in pictures if view == role)
+def _chosen(
+    folder: Path, role: str, wanted: str | None, pictures: Mapping[tuple[str, str], Path]
+) -> Sequence[str | None]:
+    there = sorted(condition for view, condition in pictures if view == role)
     if wanted is None:
         return [None]
     if wanted == "*" and there:
         return there
     if wanted not in there:
-        raise LayoutError(
-            f"{folder}: no {role} view under {wanted!r}; there are {', '.join(map(str, there)) or 'none'}"
-        )
+        raise LayoutError(f"{folder}: no {role} view under {wanted!r}; there are {', '.join(there) or 'none'}")
     return [wanted]
 
 

@@ -121,7 +121,7 @@ def _find(folder: Path, stem: str) -> Path | None:
 
 
 def _files(folder: Path, layout: _Layout, views: Mapping[str, Path]) -> dict[str, Path]:
-    found = {role: path for role, stem in layout.roles.items() if (path := _find(folder, stem))} | views
+    found = {role: path for role, stem in layout.roles.items() if (path := _find(folder, stem))} | dict(views)
     missing = [layout.roles[role] for role in ("left", "right") if role not in found]
     if missing and (folder / _LIGHTINGS).is_dir():
         raise LayoutError(

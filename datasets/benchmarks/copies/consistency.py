@@ -44,7 +44,8 @@ def best_scale(found: dict[float, float]) -> float:
 
 
 def _gray(image: NDArray[Any]) -> Gray:
-    return image.reshape(*image.shape[:2], -1).mean(axis=2, dtype=np.float32)
+    gray: Gray = image.reshape(*image.shape[:2], -1).mean(axis=2, dtype=np.float32)
+    return gray
 
 
 def _samples(truth: Truth, shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -64,7 +65,7 @@ def _patches(image: Gray, rows: NDArray[np.intp], centres: Gray) -> Gray:
     low = np.floor(centres).astype(np.intp)
     part = (centres - low)[:, None, None].astype(np.float32)
     y, x = rows[:, None, None] + step[:, None], low[:, None, None] + step
-    found = image[y, x] * (1 - part) + image[y, x + 1] * part
+    found: Gray = image[y, x] * (1 - part) + image[y, x + 1] * part
     return found.reshape(rows.size, step.size**2)
 
 
