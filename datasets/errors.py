@@ -39,5 +39,13 @@ class SceneNotFound(DatasetError, LookupError):  # noqa: N818 - it reads as the 
     """Report a scene name that a data set does not have."""
 
 
+class ArchiveError(DatasetError):
+    """Report an archive that is damaged, or holds what is not unpacked."""
+
+
+class FetchError(DatasetError):
+    """Report a file of a benchmark that cannot be fetched, or has changed since it was first fetched."""
+
+
 class UnknownDatasetError(DatasetError, LookupError):
     """Report a data set specification whose name is not known."""

@@ -98,7 +98,7 @@ _KINDS = (
     Kind("motorcycle", "the Middlebury 2014 Motorcycle pair that scikit-image ships", f"{_HERE}.benchmarks.motorcycle"),
     Kind(
         "middlebury:DIR",
-        "Middlebury MiddEval3, 2014, 2001, 2003, 2005 or 2006: a scene, a collection or a root of several",
+        "Middlebury MiddEval3 or 2001 to 2021: a scene, a collection or a root of several; ,right=E other exposures",
         f"{_HERE}.benchmarks.middlebury",
     ),
     Kind("kitti2012:DIR", "KITTI Stereo 2012: its root or its training folder", f"{_HERE}.benchmarks.kitti2012"),

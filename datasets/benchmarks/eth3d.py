@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from semidense.datasets.arrays import ImageArray
+from semidense.datasets.benchmarks.copies.publication import Publication, Source
 from semidense.datasets.benchmarks.folders import contents, existing, find_scenes, open_folder, require
 from semidense.datasets.errors import LayoutError
 from semidense.datasets.readers import calibrated_size, read_pair, read_pfm_truth
@@ -22,6 +23,20 @@ from semidense.datasets.scene import DisparityRange, Parameter, SceneSource, Tru
 
 DISPARITIES = DisparityRange(0, 63)
 """A fixed choice: ``ndisp`` in this benchmark's ``calib.txt`` is the image's width and bounds nothing."""
+
+PUBLICATIONS = (
+    Publication(
+        name="eth3d",
+        spec="eth3d:eth3d/two_view_training",
+        sources=tuple(
+            Source(f"https://www.eth3d.net/data/{name}.7z", f"eth3d/{name}")
+            for name in ("two_view_training", "two_view_training_gt", "two_view_test")
+        ),
+        licence="for research, see its page",
+        cite="Schöps et al., CVPR 2017",
+        home="https://www.eth3d.net/datasets",
+    ),
+)
 
 _PATTERN = "im0.png im1.png calib.txt [disp0GT.pfm] [mask0nocc.png]"
 _REQUIRED = ("im0.png", "im1.png", "calib.txt")

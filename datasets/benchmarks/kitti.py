@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from semidense.datasets.arrays import ImageArray
+from semidense.datasets.benchmarks.copies.publication import Publication, Source
 from semidense.datasets.benchmarks.folders import contents, open_folder
 from semidense.datasets.errors import DatasetError, LayoutError
 from semidense.datasets.formats.calibration.cameras import PairCalibration
@@ -44,6 +45,19 @@ class Edition:
     calibration: str
     disparities: DisparityRange | None
     split: Split
+
+
+def published(name: str, archives: tuple[str, ...], cite: str, page: str, megabytes: int) -> Publication:
+    """Say what an edition's publisher offers: its archives, the paper, and the page below ``datasets/kitti``."""
+    return Publication(
+        name=name,
+        spec=f"{name}:{name}",
+        sources=tuple(Source(f"https://s3.eu-central-1.amazonaws.com/avg-kitti/{each}", name) for each in archives),
+        licence="CC BY-NC-SA 3.0",
+        cite=cite,
+        home=f"https://www.cvlibs.net/datasets/kitti/{page}",
+        megabytes=megabytes,
+    )
 
 
 LARGEST = DisparityRange(0, 255)

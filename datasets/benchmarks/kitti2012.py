@@ -14,8 +14,18 @@ Scenes with a truth are for training.
 Source: Geiger, Lenz & Urtasun, "Are we ready for Autonomous Driving? The KITTI Vision Benchmark Suite", CVPR 2012.
 """
 
-from semidense.datasets.benchmarks.kitti import Edition, scenes
+from semidense.datasets.benchmarks.kitti import Edition, published, scenes
 from semidense.datasets.scene import SceneSource
+
+PUBLICATIONS = (
+    published(
+        "kitti2012",
+        ("data_stereo_flow.zip", "data_stereo_flow_calib.zip"),
+        cite="Geiger, Lenz & Urtasun, CVPR 2012",
+        page="eval_stereo_flow.php?benchmark=stereo",
+        megabytes=1900,
+    ),
+)
 
 EDITION = Edition(
     name="kitti2012",

@@ -11,11 +11,21 @@
 Source: Menze & Geiger, "Object Scene Flow for Autonomous Vehicles", CVPR 2015.
 """
 
-from semidense.datasets.benchmarks.kitti import Edition, scenes
+from semidense.datasets.benchmarks.kitti import Edition, published, scenes
 from semidense.datasets.scene import DisparityRange, SceneSource
 
 DISPARITIES = DisparityRange(0, 127)
 """A fixed choice, as the benchmark publishes no range: nearly all of the truth is below 128 px."""
+
+PUBLICATIONS = (
+    published(
+        "kitti2015",
+        ("data_scene_flow.zip", "data_scene_flow_calib.zip"),
+        cite="Menze & Geiger, CVPR 2015",
+        page="eval_scene_flow.php?benchmark=stereo",
+        megabytes=1600,
+    ),
+)
 
 EDITION = Edition(
     name="kitti2015",

@@ -1,9 +1,10 @@
-"""Read a scene of Middlebury's version 3 evaluation or of 2014: ``im0.png im1.png calib.txt`` and a PFM truth.
+"""Read a scene of Middlebury's version 3 evaluation, of 2014 or of 2021: ``im0.png im1.png calib.txt`` and a PFM truth.
 
 Disparities to search: 0 to ``ndisp - 1`` of ``calib.txt``. Mask: the published ``mask0nocc.png``; without it a
-left-right check where ``disp1.pfm`` is there, else the warped truth's.
+left-right check where the right truth is there, else the warped truth's.
 """
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,12 +13,17 @@ from semidense.datasets.benchmarks.folders import existing, require
 from semidense.datasets.readers import calibrated_size, read_pair, read_pfm_truth
 from semidense.datasets.scene import DisparityRange, Parameter, SceneSource, Truth
 
-PATTERNS = ("im0.png im1.png calib.txt [disp0GT.pfm | disp0.pfm] [mask0nocc.png]",)
+PATTERNS = ("im0.png im1.png calib.txt [disp0GT.pfm [disp1GT.pfm] | disp0.pfm [disp1.pfm]] [mask0nocc.png]",)
 """The files of a scene, for messages."""
 
 _REQUIRED = ("im0.png", "im1.png", "calib.txt")
-_MIDDEVAL3 = (("truth", "disp0GT.pfm"), ("mask", "mask0nocc.png"))
-_YEAR_2014 = (("truth", "disp0.pfm"), ("truth_right", "disp1.pfm"), ("mask", "mask0nocc.png"))
+_MIDDEVAL3 = (("truth", "disp0GT.pfm"), ("truth_right", "disp1GT.pfm"), ("mask", "mask0nocc.png"))
+_OF_A_YEAR = (("truth", "disp0.pfm"), ("truth_right", "disp1.pfm"), ("mask", "mask0nocc.png"))
+
+_SCENE_OF_2021 = re.compile(
+    r"(artroom|bandsaw|chess|curule|ladder|octogons|pendulum|podium|skates|skiboots|traproom)\d"
+)
+"""Names of 2021; those of 2014 begin with a capital."""
 
 
 def is_scene(folder: Path) -> bool:
@@ -25,21 +31,22 @@ def is_scene(folder: Path) -> bool:
     return (folder / "im0.png").is_file()
 
 
-def source(folder: Path, name: str) -> SceneSource:
-    """Describe the scene in a folder.
+def source(folder: Path, name: str, views: Mapping[str, Path]) -> SceneSource:
+    """Describe the scene in a folder; ``views`` are other pictures of the roles ``left`` and ``right``.
 
     Raises:
         LayoutError: If a file is missing.
         DatasetError: If ``calib.txt`` or the left image's header is not valid, or their sizes differ.
     """
     require(folder, _REQUIRED, PATTERNS[0])
-    of_2014 = (folder / "disp0.pfm").is_file() and not (folder / "disp0GT.pfm").is_file()
-    files = {"left": folder / "im0.png", "right": folder / "im1.png", "calib": folder / "calib.txt"}
+    of_a_year = (folder / "disp0.pfm").is_file() and not (folder / "disp0GT.pfm").is_file()
+    files = {"left": folder / "im0.png", "right": folder / "im1.png", "calib": folder / "calib.txt", **views}
     size, calib = calibrated_size(files)
-    truth = existing(folder, _YEAR_2014 if of_2014 else _MIDDEVAL3)
+    truth = existing(folder, _OF_A_YEAR if of_a_year else _MIDDEVAL3)
+    year = "2021" if _SCENE_OF_2021.fullmatch(folder.resolve().name) else "2014"
     return SceneSource(
         name=name,
-        dataset="middlebury/2014" if of_2014 else "middlebury/MiddEval3",
+        dataset=f"middlebury/{year}" if of_a_year else "middlebury/MiddEval3",
         split="test",
         size=size,
         disparities=DisparityRange(0, calib.ndisp - 1),

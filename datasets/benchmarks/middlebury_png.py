@@ -23,6 +23,7 @@ from semidense.datasets.formats.images import image_size, read_image
 from semidense.datasets.readers import assemble_truth, read_pair
 from semidense.datasets.scene import DisparityRange, Parameter, SceneSource, Truth
 
+_LIGHTINGS = "Illum1"
 _SUFFIXES = (".png", ".ppm", ".pgm")
 _SCALES_2001 = {"barn1": 8, "barn2": 8, "bull": 8, "poster": 8, "sawtooth": 8, "tsukuba": 16, "venus": 8}
 _SCALES_2003 = {"cones": 4, "teddy": 4}
@@ -45,7 +46,12 @@ _BY_VIEW = _Layout(
     "view1 view5 [disp1] [disp5] as .png, .ppm or .pgm",
 )
 
-PATTERNS = (_BY_NUMBER.pattern, _BY_VIEW.pattern)
+_TSUKUBA = _Layout(
+    {"left": "scene1.row3.col3", "right": "scene1.row3.col4", "truth": "truedisp.row3.col3"},
+    "scene1.row3.col3 scene1.row3.col4 [truedisp.row3.col3] as .png, .ppm or .pgm",
+)
+
+PATTERNS = (_BY_NUMBER.pattern, _BY_VIEW.pattern, _TSUKUBA.pattern)
 """The files of a scene, for messages."""
 
 
@@ -54,8 +60,13 @@ def is_scene(folder: Path) -> bool:
     return _layout(folder) is not None
 
 
-def source(folder: Path, name: str) -> SceneSource:
+def source(folder: Path, name: str, views: Mapping[str, Path]) -> SceneSource:
     """Describe the scene in a folder; reads the left truth once, for its largest disparity.
+
+    Args:
+        folder: The scene's.
+        name: Its name.
+        views: Other pictures of the roles ``left`` and ``right``: of another lighting or exposure.
 
     Raises:
         LayoutError: If a view is missing, or nothing tells the scale.
@@ -64,7 +75,7 @@ def source(folder: Path, name: str) -> SceneSource:
     layout = _layout(folder)
     if layout is None:
         raise LayoutError(f"{folder}: expected {' or '.join(PATTERNS)}, found {contents(folder)}")
-    files = _files(folder, layout)
+    files = _files(folder, layout, views)
     year, scale = _year_and_scale(folder, layout)
     return SceneSource(
         name=name,
@@ -98,10 +109,10 @@ def read_truth(files: Mapping[str, Path], parameters: Mapping[str, Parameter]) -
 
 
 def _layout(folder: Path) -> _Layout | None:
-    for layout in (_BY_NUMBER, _BY_VIEW):
+    for layout in (_BY_NUMBER, _BY_VIEW, _TSUKUBA):
         if _find(folder, layout.roles["left"]) or _find(folder, layout.roles["right"]):
             return layout
-    return None
+    return _BY_VIEW if (folder / _LIGHTINGS).is_dir() else None
 
 
 def _find(folder: Path, stem: str) -> Path | None:
@@ -109,9 +120,14 @@ def _find(folder: Path, stem: str) -> Path | None:
     return next((path for path in candidates if path.is_file()), None)
 
 
-def _files(folder: Path, layout: _Layout) -> dict[str, Path]:
-    found = {role: path for role, stem in layout.roles.items() if (path := _find(folder, stem))}
+def _files(folder: Path, layout: _Layout, views: Mapping[str, Path]) -> dict[str, Path]:
+    found = {role: path for role, stem in layout.roles.items() if (path := _find(folder, stem))} | dict(views)
     missing = [layout.roles[role] for role in ("left", "right") if role not in found]
+    if missing and (folder / _LIGHTINGS).is_dir():
+        raise LayoutError(
+            f"{folder}: no {missing[0]}, but pictures of several lightings and exposures; add to the folder "
+            "which to take, such as ,left=Illum1.Exp1,right=Illum1.Exp1"
+        )
     if missing:
         raise LayoutError(f"{folder}: no {missing[0]}; expected {layout.pattern}, found {contents(folder)}")
     return found

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from semidense.datasets.benchmarks.copies.check import check_scene
 from semidense.datasets.formats.pfm import read_pfm
 from semidense.datasets.occlusion import warped_truth_mask
 from semidense.datasets.registry import Dataset, open_dataset
@@ -70,6 +71,13 @@ def test_truth_carries_right_onto_left(
     assert scene.truth.mask == mask
     assert warp_correlation(scene) > 0.93
     assert warp_correlation(scene) > max(warp_correlation(scene, scale) for scale in WRONG_SCALES)
+
+
+@pytest.mark.parametrize("benchmark, name", [(sample.values[0], sample.values[1]) for sample in SAMPLES])
+def test_a_copy_passes_the_check(benchmarks: dict[str, Dataset], benchmark: str, name: str) -> None:
+    found = check_scene(benchmarks[benchmark].select([name]).scenes[0])
+    assert (found.problems, found.scale) == ((), 1)
+    assert found.fit is not None and found.fit > 0.6
 
 
 @pytest.mark.parametrize("name", ["trainingQ/Teddy", "Motorcycle", "2003/Cones"])

@@ -1,4 +1,4 @@
-"""The commands that show: the report, the viewer over the cache, the datasets.
+"""The commands that show: the report, the viewer over the cache.
 
 Nothing heavy is imported before one of them runs.
 """
@@ -12,7 +12,6 @@ from semidense.pipeline.cli.options import (
     CacheOption,
     ConfigOption,
     DatasetArgument,
-    JsonOption,
     ModeOption,
     PresetOption,
     SceneOption,
@@ -27,9 +26,6 @@ def register(app: typer.Typer) -> None:
     """Add the commands to the command line."""
     app.command()(report)
     app.command()(view)
-    data = typer.Typer(help="Look at datasets.", no_args_is_help=True)
-    data.command("list")(data_list)
-    app.add_typer(data, name="data")
 
 
 def report(
@@ -68,65 +64,3 @@ def view(
     from semidense.pipeline.pages.viewer import view as serve
 
     serve(cache, port=port, show=show)
-
-
-def data_list(
-    dataset: Annotated[str | None, typer.Argument(help="List the scenes of this dataset.")] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """List the known datasets, or the scenes of one."""
-    list_scenes(dataset, as_json) if dataset else list_datasets(as_json)
-
-
-def list_datasets(as_json: bool) -> None:
-    """Print what DATASET can be."""
-    from rich.table import Table
-
-    from semidense.datasets import describe
-    from semidense.pipeline.cli.console import print_json
-    from semidense.pipeline.results.text import results
-
-    rows = describe()
-    if as_json:
-        print_json({"datasets": [{"dataset": pattern, "about": about} for pattern, about in rows]})
-        return
-    table = Table("dataset", "what it is", box=None)
-    for pattern, about in rows:
-        table.add_row(pattern, about)
-    results().print(table)
-
-
-def list_scenes(dataset: str, as_json: bool) -> None:
-    """Print the scenes of a dataset: size, disparities, split, whether there is a truth.
-
-    Raises:
-        DatasetError: if the dataset cannot be read.
-    """
-    from rich.markup import escape
-    from rich.table import Table
-
-    from semidense.datasets import open_dataset
-    from semidense.pipeline.cli.console import print_json
-    from semidense.pipeline.results.text import results
-
-    scenes = open_dataset(dataset).scenes
-    if as_json:
-        rows = [
-            {
-                "scene": scene.name,
-                "rows": scene.size[0],
-                "columns": scene.size[1],
-                "d_min": scene.disparities.minimum,
-                "d_max": scene.disparities.maximum,
-                "split": scene.split,
-                "truth": scene.has_truth,
-            }
-            for scene in scenes
-        ]
-        print_json({"dataset": dataset, "scenes": rows})
-        return
-    table = Table("scene", "rows x columns", "disparities px", "split", "truth", box=None)
-    for scene in scenes:
-        size, bounds = f"{scene.size[0]} x {scene.size[1]}", f"{scene.disparities.minimum}..{scene.disparities.maximum}"
-        table.add_row(escape(scene.name), size, bounds, scene.split, "yes" if scene.has_truth else "no")
-    results().print(table)

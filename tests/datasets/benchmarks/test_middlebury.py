@@ -194,3 +194,78 @@ def test_files_that_do_not_fit_are_refused(
     save_image(root / name, pixels)
     with pytest.raises(kind, match=message):
         list_scenes(str(root / "2003"))[0].load()
+
+
+@pytest.fixture
+def lit(root: Path, save_image: Save) -> Path:
+    """A root with scenes of several lightings and exposures; the brightness of a picture tells its condition."""
+    scene = root / "2005/ThirdSize/Books"
+    for lighting, exposure, view in ((1, 0, 1), (1, 0, 5), (3, 2, 1), (3, 2, 5), (3, 2, 3)):
+        level = np.full((6, 8, 3), 10 * lighting + exposure, np.uint8)
+        save_image(scene / f"Illum{lighting}/Exp{exposure}/view{view}.png", level)
+    for name in ("im1E.png", "im1L.png", "ambient/L1/im0e0.png", "ambient/L1/im1e0.png", "ambient/L1/im1e1.png"):
+        save_image(root / "2014/Adirondack" / name, np.full((6, 8, 3), len(name), np.uint8))
+    return root
+
+
+@pytest.mark.parametrize(
+    "scene, options, names",
+    [
+        ("2014/Adirondack", ",right=E", ["Adirondack@E"]),
+        ("2014/Adirondack", ",right=L1.e1", ["Adirondack@L1.e1"]),
+        ("2014/Adirondack", ",right=*", [f"Adirondack@{each}" for each in ("E", "L", "L1.e0", "L1.e1")]),
+        ("2014/Adirondack", ",left=L1.e0,right=L", ["Adirondack@L1.e0-L"]),
+        ("2014/Adirondack", ",left=*", ["Adirondack@L1.e0-default"]),
+        ("2005/ThirdSize/Books", ",right=Illum1.Exp0", ["Books@Illum1.Exp0"]),
+        (
+            "2005/ThirdSize/Books",
+            ",right=*,left=*",
+            [
+                f"Books@{left}-{right}"
+                for left in ("Illum1.Exp0", "Illum3.Exp2")
+                for right in ("Illum1.Exp0", "Illum3.Exp2")
+            ],
+        ),
+    ],
+)
+def test_other_lightings_and_exposures_are_read(lit: Path, scene: str, options: str, names: list[str]) -> None:
+    found = list_scenes(f"{lit / scene}{options}")
+    assert [each.name for each in found] == names
+    for each in found:
+        left, right = each.load_images()
+        condition = each.name.partition("@")[2].split("-")
+        for view, text in ((right, condition[-1]), (left, condition[0] if len(condition) == 2 else "default")):
+            levels = {"default": 100, "E": 8, "L": 8, "L1.e0": 20, "L1.e1": 20, "Illum1.Exp0": 10, "Illum3.Exp2": 32}
+            assert (view == levels[text]).all()
+        assert each.load_truth() is not None
+
+
+def test_a_condition_that_is_not_there_is_told_with_those_that_are(lit: Path) -> None:
+    with pytest.raises(LayoutError, match=r"no right view under 'Illum9.Exp0'; there are Illum1.Exp0, Illum3.Exp2"):
+        list_scenes(f"{lit / '2005'},right=Illum9.Exp0")
+    with pytest.raises(LayoutError, match=r"no left view under '\*'; there are none"):
+        list_scenes(f"{lit / '2003'},left=*")
+
+
+def test_a_scene_of_conditions_alone_asks_which(lit: Path) -> None:
+    for view in ("view1", "view5"):
+        (lit / f"2005/ThirdSize/Books/{view}.png").unlink()
+    with pytest.raises(LayoutError, match=r"add to the folder which to take, such as ,left=Illum1\.Exp1"):
+        list_scenes(str(lit / "2005"))
+    assert len(list_scenes(f"{lit / '2005'},left=Illum3.Exp2,right=*")) == 2
+
+
+def test_2021_and_a_published_right_truth_are_known(tmp_path: Path, save_calibrated: Save) -> None:
+    save_calibrated(tmp_path / "2021/data/chess1", "disp0.pfm", "disp1.pfm")
+    save_calibrated(tmp_path / "MiddEval3/trainingQ/Teddy", "disp0GT.pfm", "disp1GT.pfm")
+    assert [each.dataset for each in list_scenes(str(tmp_path))] == ["middlebury/2021", "middlebury/MiddEval3"]
+    for each in list_scenes(str(tmp_path)):
+        truth = each.load_truth()
+        assert truth is not None and truth.mask == "left-right check"
+
+
+def test_the_published_names_of_tsukuba_are_read(tmp_path: Path, save_image: Save) -> None:
+    save_pair(save_image, tmp_path / "tsukuba", "scene1.row3.col3", "scene1.row3.col4", ".ppm")
+    save_image(tmp_path / "tsukuba/truedisp.row3.col3.pgm", np.full((6, 8), 32, np.uint8))
+    truth = list_scenes(str(tmp_path))[0].load_truth()
+    assert truth is not None and (truth.disparity == 2).all()

@@ -1,0 +1,1 @@
+"""Copies of benchmarks: what their publishers offer, fetched, and checked."""

@@ -1,0 +1,1 @@
+"""The `data` commands: what can be fetched, fetching it, and checking a copy."""
