@@ -12,8 +12,9 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from benchmarks.harness import Ratio, report, timed
+from benchmarks.harness import Ratio, Side, report, timed
 from semidense.cache import Store
+from semidense.cache.entries import check
 from semidense.pipeline.api import Task, open_store, run, status
 from semidense.pipeline.cli.commands.cache.cleaning import Wish
 from semidense.pipeline.plan.building import build
@@ -52,6 +53,12 @@ def publish(store: Store, step: Step, digests: dict[str, str], arrays: dict[str,
     return draft.publish(0.0, {}).digest
 
 
+def timed_anew(side: Side) -> float:
+    """Return the wall time of one call in a process that has read nothing of the cache, as a command's has not."""
+    check.forget()
+    return timed(side)
+
+
 def spec(scenes: int) -> str:
     """Return a data set of so many tiny scenes."""
     return f"synthetic:train=0,test={scenes},height=48,width=64,disparities=4"
@@ -69,7 +76,7 @@ def main(scenes: Annotated[int, typer.Option(help="scenes of the data set")] = 5
             "cache gc --keep": lambda: Wish(keep=(spec(scenes),)).limits(Path(folder, "cache")),
             "explain --trace": lambda: ancestry(open_store(task.cache), key),
         }
-        seconds = {name: timed(side) for name, side in sides.items()}
+        seconds = {name: timed_anew(side) for name, side in sides.items()}
     report(
         "many_scenes",
         [

@@ -147,8 +147,10 @@ def _compare_bytes(folder: Path, manifest: Manifest, remember: bool) -> None:
 
 
 def forget() -> None:
-    """Forget all hashes of this process: every byte is read again."""
+    """Forget what this process knows of files: every byte is read, and every document parsed, again."""
     _hashed.clear()
+    _entry.cache_clear()
+    _manifest.cache_clear()
 
 
 def _hash(path: str, remember: bool) -> str | None:

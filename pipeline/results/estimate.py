@@ -6,6 +6,7 @@ from math import prod
 from typing import Any
 
 from semidense.cache import Entry, Store
+from semidense.cache.document import canonical
 from semidense.cache.entries.index import Index, inputs_of
 from semidense.pipeline.plan.environment import cpu_name
 from semidense.pipeline.plan.plan import Plan
@@ -80,19 +81,27 @@ class _Measured:
         self._index = Index(all_entries)
         self._entries: dict[str, list[Entry]] = {}
         self._disparities: dict[str, int] = {}
+        self._nearest: dict[tuple[str, str], Entry | None] = {}
         for entry in all_entries:
             if entry.extras.get("cpu") == cpu_name():
                 self._entries.setdefault(entry.recipe.stage, []).append(entry)
 
     def seconds(self, step: Step, disparities: int) -> float | None:
         """Return how long a step takes by the entry nearest to it in settings, the newest of equals; None without."""
-        alike = [entry for entry in self._entries.get(step.product, ()) if _alike(entry, step)]
-        if not alike:
+        if (nearest := self._nearest_to(step)) is None:
             return None
-        nearest = min(alike, key=lambda entry: len(_differing(entry, step)))
         if step.size is None:
             return nearest.seconds
         return nearest.seconds * prod(step.size) * disparities / (_pixels(nearest) * self._searched(nearest))
+
+    def _nearest_to(self, step: Step) -> Entry | None:
+        """Return the entry nearest to a step; looked for once for all scenes, which differ in their range alone."""
+        settings = {name: value for name, value in step.settings.items() if name not in _RANGE}
+        asked = step.product, canonical(settings)
+        if asked not in self._nearest:
+            alike = [entry for entry in self._entries.get(step.product, ()) if _alike(entry, step)]
+            self._nearest[asked] = min(alike, key=lambda entry: len(_differing(entry, step)), default=None)
+        return self._nearest[asked]
 
     def _searched(self, entry: Entry) -> int:
         """Return how many disparities an entry, or one of its inputs, has searched; 1 if none did."""

@@ -147,7 +147,7 @@ class _Killer:
         from distributed import Client
 
         self._client = Client(address, set_as_default=False)
-        self._client.wait_for_workers(4)
+        self._client.wait_for_workers(4, timeout=world.HANGS)
         pids: dict[str, int] = self._client.run(os.getpid)
         self._pid = sorted(pids.values())[which]
         self._timer = threading.Timer(after, self._kill)

@@ -10,6 +10,7 @@ from semidense.pipeline.cli import console
 from semidense.pipeline.plan.environment import cpu_name
 from semidense.pipeline.plan.plan import Plan, Planned
 from semidense.pipeline.plan.steps import Step
+from semidense.pipeline.results import estimate as estimates
 from semidense.pipeline.results.estimate import Estimate, estimate
 from tests.pipeline.toy import BLURRED, SUM, step
 
@@ -76,6 +77,18 @@ def test_another_machine_says_nothing(store: Store, remember: Remember) -> None:
 def test_an_entry_without_a_size_says_nothing(store: Store, remember: Remember) -> None:
     remember("blurred", 6.0, None, mode="exact", d_min=0, d_max=9, window=11)
     assert estimate(plan(COSTS), store).unknown == ("blurred",)
+
+
+def test_the_nearest_is_looked_for_once_for_all_scenes(
+    store: Store, remember: Remember, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for seconds in (6.0, 8.0):
+        remember("blurred", seconds, mode="exact", d_min=0, d_max=9, window=int(seconds))
+    looked, real = [], estimates._alike
+    monkeypatch.setattr(estimates, "_alike", lambda entry, step: looked.append(entry) or real(entry, step))
+    scenes = [replace(COSTS, id=str(ends), settings={**COSTS.settings, "d_max": ends}) for ends in (9, 19, 29)]
+    assert estimate(plan(*scenes), store).seconds == 8.0 * (1 + 2 + 3)
+    assert len(looked) == 2
 
 
 def test_the_nearest_settings_count_and_of_equals_the_newest(store: Store, remember: Remember) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.markup import escape
 from rich.table import Table
 
-from semidense.cache import Entry, Store
+from semidense.cache import Entry
 from semidense.cache.upkeep.gc import Item, Limits, Survey, collect, survey
 from semidense.pipeline.api import Task, open_store, status
 from semidense.pipeline.cli.console import print_json
@@ -44,13 +44,14 @@ class Wish:
             raise UsageError("--config and --train say how a dataset is kept: name it with --keep DATASET")
         seconds = _amount(self.unused_for, _UNITS, "--unused-for", "30d, 12h, 5min")
         largest = _amount(self.max_size, _BYTES, "--max-size", "20GB, 500MB")
-        reached = frozenset(self._reached(folder)) if self.keep else None
-        return Limits(reached, seconds, None if largest is None else int(largest), _useless(open_store(folder)))
+        entries = list(open_store(folder).entries())
+        reached = frozenset(self._reached(folder, entries)) if self.keep else None
+        return Limits(reached, seconds, None if largest is None else int(largest), _useless(entries))
 
-    def _reached(self, folder: Path | None) -> Iterator[str]:
+    def _reached(self, folder: Path | None, entries: Iterable[Entry]) -> Iterator[str]:
         """Yield the keys that the datasets reach, each with each configuration."""
         by_label: dict[tuple[tuple[str, str], ...], list[Entry]] = {}
-        for entry in open_store(folder).entries():
+        for entry in entries:
             by_label.setdefault(tuple(sorted(entry.label.items())), []).append(entry)
         for dataset in self.keep:
             for config in self.configs or (None,):
@@ -59,9 +60,9 @@ class Wish:
                     yield from [planned.key] if planned.key else _possible(same_label, planned)
 
 
-def _useless(store: Store) -> dict[str, str]:
+def _useless(entries: Iterable[Entry]) -> dict[str, str]:
     """Return the entries that another version made and this one cannot use, with the reason."""
-    versions = {entry.key: former_version(entry) for entry in store.entries()}
+    versions = {entry.key: former_version(entry) for entry in entries}
     return {key: f"made by version {version}, whose code is gone" for key, version in versions.items() if version}
 
 
