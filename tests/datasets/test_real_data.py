@@ -7,10 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from semidense.datasets.arrays import DisparityMap, Mask
 from semidense.datasets.benchmarks.copies.check import check_scene
 from semidense.datasets.formats.pfm import read_pfm
 from semidense.datasets.occlusion import warped_truth_mask
 from semidense.datasets.registry import Dataset, open_dataset
+from semidense.stages.metrics.eth3d import eth3d_figures
+from semidense.stages.metrics.kitti import d1_counts, d1_figures, kitti2012_figures
+from semidense.stages.metrics.middlebury import middlebury_figures
 
 PATHS = {"middlebury": "middlebury", "kitti2012": "kitti2012", "kitti2015": "kitti2015", "eth3d": "eth3d"}
 WRONG_SCALES = (-1, 0, 0.25, 0.5, 0.9, 1.1, 2, 4)
@@ -48,14 +52,15 @@ def test_all_185_scenes_are_found_and_split(benchmarks: dict[str, Dataset]) -> N
     assert sum(scene.has_truth for scene in scenes) == 185 - 15
 
 
-def test_every_scene_loads_and_its_truth_lies_in_its_range(benchmarks: dict[str, Dataset]) -> None:
-    for dataset in benchmarks.values():
+def test_every_scene_loads_and_its_truth_lies_in_its_range_and_scores_0(benchmarks: dict[str, Dataset]) -> None:
+    for kind, dataset in benchmarks.items():
         for source in dataset.scenes:
             truth = source.load().truth
             if truth is not None:
                 assert source.disparities.minimum <= np.nanmin(truth.disparity), source.name
                 assert np.nanmax(truth.disparity) <= source.disparities.maximum, source.name
                 assert 0.5 < truth.nonocc.sum() / (~np.isnan(truth.disparity)).sum() <= 1, source.name
+                judge(kind, truth.disparity, truth.nonocc, source.disparities.maximum)
 
 
 @pytest.mark.parametrize("benchmark, name, mask", SAMPLES)
@@ -92,3 +97,20 @@ def test_the_rendered_pair_has_spaces_in_its_pfm_header(stereo_data: Path) -> No
     truth = read_pfm(stereo_data / "sceneflow" / "flyingthings_0032_0006" / "disp0.pfm")
     assert truth.shape == (540, 960)
     assert (round(float(np.nanmin(truth))), round(float(np.nanmax(truth)))) == (1, 130)
+
+
+def judge(kind: str, truth: DisparityMap, visible: Mask, largest: int) -> None:
+    """Judge a truth against itself by the figures of its benchmark."""
+    everywhere = np.ones_like(visible)
+    for mask in (visible, everywhere):
+        if kind == "middlebury":
+            figures = middlebury_figures(truth, truth, mask, largest, 4.0)
+            assert (figures["totbad0.5"], figures["avgerr"], figures["A99"]) == (0, 0, 0)
+        if kind == "eth3d":
+            figures = eth3d_figures(truth, truth, mask)
+            assert (figures["bad0.5"], figures["rms"], figures["coverage"]) == (0, 0, 100)
+    if kind == "kitti2012":
+        assert set(kitti2012_figures(truth, truth).values()) == {0, 100}
+    if kind == "kitti2015":
+        figures = d1_figures(d1_counts(truth, truth))
+        assert (figures["D1-all"], figures["D1-est"], figures["density"]) == (0, 0, 100)

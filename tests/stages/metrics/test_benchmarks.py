@@ -1,14 +1,12 @@
 """The figures of the benchmarks against loops that follow their evaluation programs pixel by pixel."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from semidense.datasets import open_dataset
 from semidense.stages.metrics.eth3d import eth3d_figures
 from semidense.stages.metrics.kitti import d1_counts, d1_figures, fill_background, kitti2012_figures
 from semidense.stages.metrics.middlebury import WEIGHTS, middlebury_figures, weighted_mean
@@ -239,26 +237,3 @@ def test_a_truth_scores_0_against_itself() -> None:
 def test_sizes_that_do_not_fit_are_refused(shape: tuple[int, int], message: str) -> None:
     with pytest.raises(StageError, match=message):
         middlebury_figures(np.ones(shape), np.ones((2, 3)), np.ones((2, 3), bool), 9)
-
-
-def test_every_published_truth_scores_0_against_itself(stereo_data: Path) -> None:
-    for kind in ("middlebury", "kitti2012", "kitti2015", "eth3d"):
-        for source in open_dataset(f"{kind}:{stereo_data / kind}").scenes:
-            if (truth := source.load_truth()) is not None:
-                judge(kind, truth.disparity, truth.nonocc, source.disparities.maximum)
-
-
-def judge(kind: str, truth: Map, visible: NDArray[np.bool_], largest: int) -> None:
-    everywhere = np.ones_like(visible)
-    for mask in (visible, everywhere):
-        if kind == "middlebury":
-            figures = middlebury_figures(truth, truth, mask, largest, 4.0)
-            assert (figures["totbad0.5"], figures["avgerr"], figures["A99"]) == (0, 0, 0)
-        if kind == "eth3d":
-            figures = eth3d_figures(truth, truth, mask)
-            assert (figures["bad0.5"], figures["rms"], figures["coverage"]) == (0, 0, 100)
-    if kind == "kitti2012":
-        assert set(kitti2012_figures(truth, truth).values()) == {0, 100}
-    if kind == "kitti2015":
-        figures = d1_figures(d1_counts(truth, truth))
-        assert (figures["D1-all"], figures["D1-est"], figures["density"]) == (0, 0, 100)

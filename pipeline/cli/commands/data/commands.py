@@ -26,9 +26,9 @@ def data_list(
     data: DataOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """List the known datasets and what can be fetched, or the scenes of one.
+    """List the known datasets, or the scenes of one.
 
-    Says of what can be fetched how large it is, its licence, what to cite, and whether it is here.
+    Below the datasets is what can be fetched: how large it is, its licence, what to cite, and whether it is here.
     """
     from semidense.pipeline.cli.commands.data.listing import list_datasets, list_scenes
 

@@ -133,6 +133,29 @@ def test_a_published_layout_is_fetched_and_read(
     assert not (data / ".archives").exists()
 
 
+def test_the_7z_archives_of_eth3d_are_fetched_and_read(tmp_path: Path, publisher: Publisher, pfm: bytes) -> None:
+    py7zr = pytest.importorskip("py7zr", reason="py7zr is not installed")
+    views = {"im0.png": gray(9), "im1.png": gray(9), "calib.txt": CALIB.encode()}
+    contents = {
+        "two_view_training": {f"playground_1l/{each}": content for each, content in views.items()},
+        "two_view_training_gt": {"playground_1l/disp0GT.pfm": pfm, "playground_1l/mask0nocc.png": gray(255)},
+        "two_view_test": {f"lakeside_1l/{each}": content for each, content in views.items()},
+    }
+    for name, files in contents.items():
+        with py7zr.SevenZipFile(tmp_path / "a.7z", "w") as archive:
+            for each, content in files.items():
+                archive.writestr(content, each)
+        publisher.files[f"data/{name}.7z"] = (tmp_path / "a.7z").read_bytes()
+    fetcher(tmp_path / "data", publisher.address)(publication("eth3d"))
+    found = {each.name: each for each in open_dataset(f"eth3d:{tmp_path / 'data/eth3d'}").scenes}
+    assert {name: each.has_truth for name, each in found.items()} == {
+        "two_view_training/playground_1l": True,
+        "two_view_test/lakeside_1l": False,
+    }
+    truth = found["two_view_training/playground_1l"].load_truth()
+    assert truth is not None and truth.mask == "published" and (truth.disparity == 2).all()
+
+
 def test_every_address_is_https_and_every_name_is_there_once() -> None:
     offered = publications()
     assert {f"middeval3-{size}" for size in "qhf"} | {"kitti2012", "kitti2015", "eth3d"} < offered.keys()
