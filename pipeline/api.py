@@ -11,6 +11,7 @@ from typing import Any, TypedDict, Unpack
 
 from semidense.cache import Store
 from semidense.datasets import Dataset, SceneSource, open_dataset
+from semidense.datasets.formats.files import user_path
 from semidense.pipeline.execution.retry import attempt
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.execution.watch import Unwatched, Watch
@@ -31,7 +32,7 @@ def open_store(folder: Path | str | None = None) -> Store:
     from platformdirs import user_cache_path
 
     chosen = folder or os.environ.get(CACHE_VARIABLE) or user_cache_path("semidense-stereo", appauthor=False)
-    return Store(Path(chosen).expanduser())
+    return Store(user_path(str(chosen)))
 
 
 Data = str | Path | Dataset
