@@ -7,8 +7,8 @@
 | ``P0`` to ``P3`` | the stereo, object and odometry benchmarks | gray 0, 1; colour 2, 3 |
 | ``P1`` and ``P2`` | Karlsruhe's without ``roi`` | left, right |
 
-Every ``P`` is a 3 x 4 projection matrix, row by row; comments follow a ``#``. The left camera's last column counts: that
-of KITTI's colour camera is not 0. Source: https://www.cvlibs.net/datasets/kitti/setup.php
+Every ``P`` is a 3 x 4 projection matrix, row by row; comments follow a ``#``. The left camera's last column counts:
+that of KITTI's colour camera is not 0. Source: https://www.cvlibs.net/datasets/kitti/setup.php
 """
 
 import re

@@ -2,8 +2,8 @@
 
 Their values come from files that ``camera_calibration`` writes, or from messages as ``rostopic echo`` or ``ros2 topic
 echo`` prints them. A message's ``roi`` and ``binning`` say which part of the full image was sent, and how coarsely. The
-projection matrix is that of the full image: the offset is taken off ``cx`` and ``cy``, then the first two rows are divided
-by the binning.
+projection matrix is that of the full image: the offset is taken off ``cx`` and ``cy``, then the first two rows are
+divided by the binning.
 Sources: ROS message ``sensor_msgs/CameraInfo``; ``image_geometry``'s ``PinholeCameraModel``.
 """
 
