@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from semidense.pipeline.cli.commands import compare, match, run, show
+from semidense.pipeline.cli.commands import compare, match, rectify, run, show
 from semidense.pipeline.cli.commands.cache.commands import cache_app
 
 app = typer.Typer(
@@ -37,7 +37,7 @@ def _options(
     """Take the options that stand before a command."""
 
 
-for commands in (run, match, compare, show):
+for commands in (run, match, rectify, compare, show):
     commands.register(app)
 app.add_typer(cache_app, name="cache")
 

@@ -11,14 +11,16 @@ from semidense.pipeline.cli.options import (
     JsonOption,
     ModeOption,
     PresetOption,
+    QuietOption,
     SceneOption,
     SchedulerOption,
     SetOption,
+    VerboseOption,
     WorkersOption,
     chosen,
+    chosen_preset,
     config_file,
 )
-from semidense.pipeline.plan.presets import DEFAULT
 
 
 def register(app: typer.Typer) -> None:
@@ -59,7 +61,7 @@ def compare(
         float, typer.Option("--threshold", help="Error in px above which tables and figures call a pixel wrong.")
     ] = 1.0,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     output: Annotated[
@@ -69,6 +71,8 @@ def compare(
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
     cache: CacheOption = None,
+    verbose: VerboseOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compare other matchers with the two networks.
@@ -87,9 +91,10 @@ def compare(
     if threshold not in THRESHOLDS:
         offered = ", ".join(f"{each:g}" for each in THRESHOLDS)
         raise UsageError(f"--threshold {threshold:g}: figures are worked out for {offered} px")
-    task = api.Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, preset)
+    named = chosen_preset(preset, config)
+    task = api.Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, named)
     experiments = experiment or comparison.EXPERIMENTS
-    with ProgressWatch(console.announce) as watch:
+    with ProgressWatch(console.announce, verbose - quiet) as watch:
         found = comparison.compare(
             task,
             experiments,

@@ -16,16 +16,18 @@ from semidense.pipeline.cli.options import (
     OutputOption,
     PresetOption,
     ProductArgument,
+    QuietOption,
     SceneOption,
     SchedulerOption,
     SetOption,
     TrainOption,
     UptoOption,
+    VerboseOption,
     WorkersOption,
     chosen,
+    chosen_preset,
     config_file,
 )
-from semidense.pipeline.plan.presets import DEFAULT
 
 if TYPE_CHECKING:
     from semidense.cache import Store
@@ -45,7 +47,7 @@ def run(
     upto: UptoOption = "metrics",
     scene: SceneOption = None,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
@@ -55,6 +57,8 @@ def run(
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
     cache: CacheOption = None,
+    verbose: VerboseOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Make the products of a dataset; what is cached is reused."""
@@ -65,7 +69,7 @@ def run(
     task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     if dry_run:
         return _print_plan(api.status(task, upto, forced=force or ()), api.open_store(cache), as_json)
-    with ProgressWatch(console.announce) as watch:
+    with ProgressWatch(console.announce, verbose - quiet) as watch:
         result = api.run(task, upto, forced=force or (), watch=watch, scheduler=scheduler, workers=workers)
     files = _export(result, output)
     if as_json:
@@ -88,16 +92,19 @@ def sweep(
             "--set", help="Try several values of a setting: section.field=value1,value2; all combinations are made."
         ),
     ] = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Write sweep.csv, sweep.png and sweep.json to this folder.")
     ] = Path("sweep"),
+    dry_run: DryRunOption = False,
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
     cache: CacheOption = None,
+    verbose: VerboseOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compare error and density at many thresholds R.
@@ -110,7 +117,10 @@ def sweep(
     from semidense.pipeline.files.run_files import write_sweep
 
     task = _task(dataset, scene, chosen(None, mode), config, train, cache, preset)
-    with ProgressWatch(console.announce) as watch:
+    if dry_run:
+        request = api.sweep_request(task, thresholds, settings or ())
+        return _print_plan(api.planned(task, request), api.open_store(cache), as_json)
+    with ProgressWatch(console.announce, verbose - quiet) as watch:
         result = api.sweep(task, thresholds, settings or (), watch=watch, scheduler=scheduler, workers=workers)
     files = write_sweep(result.metrics, output)
     if as_json:
@@ -120,6 +130,7 @@ def sweep(
         console.print_sweep(result.metrics, result.mask_kinds())
         _say_files(files)
         print(console.reuse_line(result.made.values()))
+    return None
 
 
 def status(
@@ -127,7 +138,7 @@ def status(
     upto: UptoOption = "metrics",
     scene: SceneOption = None,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
@@ -146,7 +157,7 @@ def explain(
     dataset: DatasetArgument = "motorcycle",
     scene: SceneOption = None,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
@@ -168,7 +179,7 @@ def explain(
     task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     planned = api.explain(task, product)
     found = explanation(planned, api.open_store(cache))
-    found |= {"preset": {"name": preset, "settings": list(preset_settings(preset))}}
+    found |= {"preset": {"name": task.preset, "settings": list(preset_settings(task.preset))}}
     if graph:
         draw_provenance(planned, api.open_store(cache), graph, task)
     if as_json:
@@ -189,7 +200,7 @@ def inspect(
         int | None, typer.Option("--disparity", help="Draw the slice of costs at this disparity, px.")
     ] = None,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
@@ -218,11 +229,12 @@ def _task(
     config: Path | None,
     train: bool,
     cache: Path | None,
-    preset: str,
+    preset: str | None,
 ) -> "Task":
     from semidense.pipeline.api import Task
 
-    return Task(dataset, tuple(scenes or ()), settings, config_file(config), train, cache, preset)
+    chosen = chosen_preset(preset, config)
+    return Task(dataset, tuple(scenes or ()), settings, config_file(config), train, cache, chosen)
 
 
 def _print_plan(plan: "Plan", store: "Store", as_json: bool) -> None:
