@@ -138,7 +138,7 @@ def _read_exported(file: Path) -> dict[str, Any]:
     except OSError as error:
         raise UsageError(f"configuration {file}: {error.strerror}") from None
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
-        raise UsageError(f"configuration {file}: no config.json or summary.json of this version") from None
+        raise UsageError(f"configuration {file}: it is no config.json or summary.json of this version") from None
     if not found or any(each != found[0] for each in found):
         raise UsageError(f"configuration {file}: it holds {len(found)} sets of settings that differ; give a TOML file")
     return found[0]

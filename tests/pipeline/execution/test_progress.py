@@ -156,7 +156,7 @@ def test_a_run_is_announced_before_it_begins() -> None:
     ],
 )
 def test_how_much_is_said(capsys: pytest.CaptureFixture[str], detail: int, lines: list[str]) -> None:
-    with ProgressWatch(lambda plan, store: print("time: 5 s", file=sys.stderr), detail) as watch:
+    with ProgressWatch(lambda plan, store: sys.stderr.write("time: 5 s\n") and None, detail) as watch:
         watch.planned(Plan((), ()), NO_STORE)
         for tested, seconds, reused in ((TILED, 2.0, False), (TRAINED, 0.5, False), (TRAINED, 9.0, True)):
             watch.published(Made(tested, "k", "d", seconds, reused))
@@ -164,7 +164,7 @@ def test_how_much_is_said(capsys: pytest.CaptureFixture[str], detail: int, lines
 
 
 def test_runs_that_are_expected_together_are_announced_once(capsys: pytest.CaptureFixture[str]) -> None:
-    with ProgressWatch(lambda plan, store: print(len(plan.todo()), file=sys.stderr)) as watch:
+    with ProgressWatch(lambda plan, store: sys.stderr.write(f"{len(plan.todo())}\n") and None) as watch:
         watch.expect(Plan((Planned(TILED, "missing"), Planned(TRAINED, "missing")), ()), NO_STORE)
         watch.planned(Plan((Planned(TILED, "missing"),), ()), NO_STORE)
         watch.planned(Plan((Planned(TRAINED, "missing"),), ()), NO_STORE)
