@@ -51,7 +51,7 @@ TrainOption = Annotated[
     bool, typer.Option("--train", help="Train the networks instead of using the weights that come with the package.")
 ]
 VerboseOption = Annotated[
-    bool, typer.Option("--verbose", "-v", help="Name every product that is made or found, not only the slow ones.")
+    bool, typer.Option("--verbose", "-v", help="Name every product that is made, not only the slow ones.")
 ]
 QuietOption = Annotated[
     bool, typer.Option("--quiet", "-q", help="Print results and warnings only: no progress, no estimate of the time.")

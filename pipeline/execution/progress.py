@@ -26,7 +26,7 @@ class ProgressWatch:
 
     Args:
         announce: called with the plan and the cache before each run begins, such as to print how long it will take.
-        detail: -1 says nothing; 0 names products that took a second or more; 1 names every product.
+        detail: -1 says nothing; 0 names products that took a second or more; 1 names every product that is made.
     """
 
     def __init__(self, announce: Callable[[Plan, Store], None] | None = None, detail: int = 0) -> None:

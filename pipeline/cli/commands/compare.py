@@ -8,6 +8,7 @@ import typer
 from semidense.pipeline.cli.options import (
     CacheOption,
     ConfigOption,
+    DryRunOption,
     JsonOption,
     ModeOption,
     PresetOption,
@@ -68,6 +69,7 @@ def compare(
         Path,
         typer.Option("--output", "-o", help="Write comparison.csv, comparison.json and the figures to this folder."),
     ] = Path("comparison"),
+    dry_run: DryRunOption = False,
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
     cache: CacheOption = None,
@@ -81,9 +83,10 @@ def compare(
     """
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
-    from semidense.pipeline.comparison import experiments as comparison
     from semidense.pipeline.comparison import files as comparison_report
     from semidense.pipeline.comparison import tables
+    from semidense.pipeline.comparison.experiments import carry_out_comparison
+    from semidense.pipeline.comparison.prepared import EXPERIMENTS, prepare
     from semidense.pipeline.execution.progress import ProgressWatch
     from semidense.pipeline.plan.errors import UsageError
     from semidense.stages.metrics.errors import THRESHOLDS
@@ -93,24 +96,19 @@ def compare(
         raise UsageError(f"--threshold {threshold:g}: figures are worked out for {offered} px")
     named = chosen_preset(preset, config)
     task = api.Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, named)
-    experiments = experiment or comparison.EXPERIMENTS
+    prepared = prepare(task, experiment or EXPERIMENTS, train_on, protocol or (), without=without or ())
+    store = api.open_store(cache)
+    if dry_run:
+        return console.show_plan(prepared.plan(), store, as_json)
     with ProgressWatch(console.announce, verbose - quiet) as watch:
-        found = comparison.compare(
-            task,
-            experiments,
-            train_on,
-            protocol or (),
-            without=without or (),
-            watch=watch,
-            scheduler=scheduler,
-            workers=workers,
-        )
+        watch.expect(prepared.plan(), store)
+        found = carry_out_comparison(prepared, watch=watch, scheduler=scheduler, workers=workers)
     files = comparison_report.write_comparison(found, output, threshold)
     if as_json:
-        console.print_json(comparison_report.as_json(found, files))
-        return
+        return console.print_json(comparison_report.as_json(found, files))
     tables.print_comparison(found, found.result.mask_kinds().values(), threshold)
     console.print_notes(found.notes)
     for file in files:
         typer.echo(f"wrote {file}")
     typer.echo(console.reuse_line(found.result.made.values()))
+    return None

@@ -160,14 +160,9 @@ def _plan(task: "Task", wishes: "Wishes", as_json: bool) -> None:
 
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
-    from semidense.pipeline.results.estimate import estimate
 
     plan = api.status(replace(task, settings=(*task.settings, *wishes.settings)), wishes.product)
-    time = estimate(plan, api.open_store(task.cache))
-    if as_json:
-        console.print_json({"steps": console.step_rows(plan, {}), "estimate_seconds": time.seconds})
-    else:
-        console.print_plan(plan, time)
+    console.show_plan(plan, api.open_store(task.cache), as_json)
 
 
 def _carry_out(

@@ -30,9 +30,7 @@ from semidense.pipeline.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from semidense.cache import Store
     from semidense.pipeline.api import Task
-    from semidense.pipeline.plan.plan import Plan
     from semidense.pipeline.results.result import Result
 
 
@@ -68,7 +66,7 @@ def run(
 
     task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     if dry_run:
-        return _print_plan(api.status(task, upto, forced=force or ()), api.open_store(cache), as_json)
+        return console.show_plan(api.status(task, upto, forced=force or ()), api.open_store(cache), as_json)
     with ProgressWatch(console.announce, verbose - quiet) as watch:
         result = api.run(task, upto, forced=force or (), watch=watch, scheduler=scheduler, workers=workers)
     files = _export(result, output)
@@ -119,7 +117,7 @@ def sweep(
     task = _task(dataset, scene, chosen(None, mode), config, train, cache, preset)
     if dry_run:
         request = api.sweep_request(task, thresholds, settings or ())
-        return _print_plan(api.planned(task, request), api.open_store(cache), as_json)
+        return console.show_plan(api.planned(task, request), api.open_store(cache), as_json)
     with ProgressWatch(console.announce, verbose - quiet) as watch:
         result = api.sweep(task, thresholds, settings or (), watch=watch, scheduler=scheduler, workers=workers)
     files = write_sweep(result.metrics, output)
@@ -147,9 +145,10 @@ def status(
 ) -> None:
     """Print which products are cached, and why the others must be made."""
     from semidense.pipeline import api
+    from semidense.pipeline.cli import console
 
     plan = api.status(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), upto)
-    _print_plan(plan, api.open_store(cache), as_json)
+    console.show_plan(plan, api.open_store(cache), as_json)
 
 
 def explain(
@@ -235,18 +234,6 @@ def _task(
 
     chosen = chosen_preset(preset, config)
     return Task(dataset, tuple(scenes or ()), settings, config_file(config), train, cache, chosen)
-
-
-def _print_plan(plan: "Plan", store: "Store", as_json: bool) -> None:
-    from semidense.pipeline.cli import console
-    from semidense.pipeline.results.estimate import estimate
-
-    time = estimate(plan, store)
-    if as_json:
-        steps = console.step_rows(plan, {})
-        console.print_json({"steps": steps, "metrics": [], "estimate_seconds": time.seconds})
-    else:
-        console.print_plan(plan, time)
 
 
 def _print_result(result: "Result", files: list[Path]) -> None:
