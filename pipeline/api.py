@@ -11,6 +11,7 @@ from typing import Any, TypedDict, Unpack
 
 from semidense.cache import Store
 from semidense.datasets import Dataset, SceneSource, open_dataset
+from semidense.datasets.formats.files import user_path
 from semidense.pipeline.execution.retry import attempt
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.execution.watch import Unwatched, Watch
@@ -31,7 +32,7 @@ def open_store(folder: Path | str | None = None) -> Store:
     from platformdirs import user_cache_path
 
     chosen = folder or os.environ.get(CACHE_VARIABLE) or user_cache_path("semidense-stereo", appauthor=False)
-    return Store(Path(chosen).expanduser())
+    return Store(user_path(str(chosen)))
 
 
 Data = str | Path | Dataset
@@ -130,8 +131,13 @@ def status(
 ) -> Plan:
     """Return the plan of a run: every step with its state. Nothing is made or changed."""
     task = Task.of(dataset, **options)
+    return planned(task, task.request(upto), forced)
+
+
+def planned(task: Task, request: Request, forced: Sequence[str] = ()) -> Plan:
+    """Return the plan of a request: every step with its state. Nothing is made or changed."""
     store = open_store(task.cache)
-    return make_plan(close_ranges(task.request(upto), store), store, forced)
+    return make_plan(close_ranges(request, store), store, forced)
 
 
 def run(
@@ -176,11 +182,11 @@ def carry_out(
     extras = provenance(sys.argv)
 
     def make(wanted: Request, forced: Iterable[str] = ()) -> tuple[Plan, dict[str, Made]]:
-        planned = functools.partial(make_plan, wanted, store, forced)
-        return attempt(planned, store, watch or Unwatched(), extras, scheduler, workers)
+        plan_again = functools.partial(make_plan, wanted, store, forced)
+        return attempt(plan_again, store, watch or Unwatched(), extras, scheduler, workers)
 
     plan, made = make(close_ranges(request, store, lambda wanted: make(wanted)[1]), forced)
-    return Result(plan, made, store, list(_metric_rows(plan, store, made)))
+    return Result(plan, made, store, list(_metric_rows(plan, store, made)), task.preset)
 
 
 def _metric_rows(plan: Plan, store: Store, made: Mapping[str, Made]) -> Iterator[dict[str, Any]]:
@@ -220,11 +226,18 @@ def sweep(
         One result with the metrics of all variants; ``variant`` in each row names the combination.
     """
     task = Task.of(dataset, **options)
+    return carry_out(task, sweep_request(task, R, over), (), watch, scheduler, workers)
+
+
+def sweep_request(
+    task: Task, R: str | float | Sequence[float], over: Mapping[str, Sequence[object]] | Sequence[str]
+) -> Request:
+    """Return the request of a sweep; see ``sweep``."""
     thresholds = [f"semidense.R={value!r}" for value in parse_thresholds(R)]
     variants = [
         (threshold, *combination) for combination in itertools.product(*_combined(over)) for threshold in thresholds
     ]
-    return carry_out(task, task.request("metrics", variants), (), watch, scheduler, workers)
+    return task.request("metrics", variants)
 
 
 def _combined(over: Mapping[str, Sequence[object]] | Sequence[str]) -> list[list[str]]:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from semidense.datasets.errors import DatasetError, LayoutError, MissingFileError
+from semidense.datasets.formats.files import user_path
 
 _DEEPEST = 4
 
@@ -21,7 +22,7 @@ def open_folder(argument: str, pattern: str) -> Path:
     """
     if not argument:
         raise DatasetError(f"no folder given; write {pattern}")
-    folder = Path(argument).expanduser()
+    folder = user_path(argument)
     if not folder.is_dir():
         raise MissingFileError(f"{folder}: no such folder; {pattern} needs one")
     return folder

@@ -1,10 +1,22 @@
 """Open what a user named, if it is a file that can be read more than once."""
 
+import codecs
 import stat
 from pathlib import Path
 from typing import BinaryIO
 
 from semidense.datasets.errors import DatasetError, MissingFileError
+
+_UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+
+
+def user_path(text: str) -> Path:
+    """Return a path as a user means it: a leading ``~`` is a home folder, unless a file has that very name."""
+    path = Path(text)
+    try:
+        return path if path.exists() else path.expanduser()
+    except RuntimeError:  # there is no such user
+        return path
 
 
 def open_file(path: Path) -> BinaryIO:
@@ -53,3 +65,15 @@ def read_bytes(path: Path, largest: int, error: type[DatasetError], kind: str) -
     if len(content) > largest:
         raise error(f"{path}: more than {largest:,} bytes; the file is no {kind}")
     return content
+
+
+def read_text(path: Path, largest: int, error: type[DatasetError], kind: str) -> str:
+    """Read a small text file whole: UTF-8, or UTF-16 as Windows' programs write it; a byte order mark is dropped.
+
+    Raises what `read_bytes` raises, and an error of the same class for a file that is no such text.
+    """
+    content = read_bytes(path, largest, error, kind)
+    try:
+        return content.decode("utf-16" if content.startswith(_UTF16) else "utf-8-sig")
+    except UnicodeDecodeError as fault:
+        raise error(f"{path}: not plain text; the file is no {kind}, or must be saved as UTF-8") from fault

@@ -24,12 +24,18 @@ from semidense.datasets.formats.limits import check_pixels
 
 # The size is judged by `check_pixels`, in one line; Pillow's warning would be a second one.
 warnings.filterwarnings("ignore", category=Image.DecompressionBombWarning)
+# Alpha is dropped, in palettes too.
+warnings.filterwarnings("ignore", "Palette images with Transparency", UserWarning, r"PIL\.Image")
 
 _Pixels: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.integer]]
 _FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "PPM")
 _DECODER_ERRORS = (OSError, EOFError, SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, struct.error)
 """What Pillow's decoders raise on truncated or garbled files."""
 _ORIENTATION = 0x0112
+_PHOTOMETRIC, _WHITE_IS_ZERO = 0x0106, 0
+_KIND, _OLD_KIND = 0x00FE, 0x00FF
+"""What a page of a TIFF says of itself: bit 0, or 2 in the old tag, is a smaller version; bit 2 is a mask."""
+_EIGHT_BITS = 255
 _MP_ENTRIES = 0xB002
 """What a JPEG of several images (MPO) says of each of them."""
 _TRANSPOSED = 5
@@ -50,7 +56,8 @@ def read_image(path: str | os.PathLike[str]) -> ImageArray:
 
     What is stored decides what comes back: gray gives (y, x), colour and palettes give (y, x, 3) RGB; 16-bit gray
     stays uint16, everything else is uint8. Alpha is dropped: colours are taken as stored, not blended with anything.
-    The EXIF orientation is applied.
+    The values of a PGM or PPM are scaled by its own largest value: to 65535 if that is above 255, else to 255. Of a
+    TIFF with smaller versions and masks, the page that is neither is read. The EXIF orientation is applied.
 
     Returns:
         uint8 or uint16, (y, x) or (y, x, 3), writable.
@@ -83,13 +90,14 @@ def _opened(path: Path) -> Iterator[tuple[BinaryIO, ImageFile]]:
     """Open a file and turn whatever goes wrong with it, now or later, into one line."""
     try:
         with open_file(path) as file, Image.open(file, formats=_FORMATS) as image:
+            _turn_to_picture(path, image)
             check_pixels(path, image.height, image.width, ImageError)
             yield file, image
     except (ImageError, MissingFileError):
         raise
     except UnidentifiedImageError as error:
         raise ImageError(
-            f"{path}: no image in {', '.join(_FORMATS)}; it is empty, damaged or of another kind"
+            f"{path}: no image in {', '.join(_FORMATS)}; it is empty, damaged or of another kind: save it as PNG"
         ) from error
     except Image.DecompressionBombError as error:
         raise ImageError(f"{path}: far too many pixels; scale the image down") from error
@@ -107,13 +115,29 @@ def _orientation(image: ImageFile) -> int:
     return orientation if orientation in _STEPS else 1
 
 
+def _turn_to_picture(path: Path, image: ImageFile) -> None:
+    """Turn to the only page that is neither a preview nor a mask; raises `ImageError` if there are several."""
+    count = getattr(image, "n_frames", 1)
+    if count == 1 or _only_previews(image):
+        return
+    pages = [page for page in range(count) if image.format != "TIFF" or _is_picture(image, page)]
+    if len(pages) != 1:
+        raise ImageError(f"{path}: holds {count} images; save the one to match by itself")
+    image.seek(pages[0])
+
+
+def _is_picture(image: ImageFile, page: int) -> bool:
+    image.seek(page)
+    tags = image.getexif()
+    return not int(tags.get(_KIND, 0)) & 0b101 and int(tags.get(_OLD_KIND, 1)) != 2
+
+
 def _target_mode(path: Path, image: ImageFile) -> str:
-    frames = getattr(image, "n_frames", 1)
-    if frames > 1 and not _only_previews(image):
-        raise ImageError(f"{path}: holds {frames} images; save the one to match by itself")
     for tile in image.tile:
         layout, *rest = tile.args if isinstance(tile.args, tuple) else (tile.args,)
-        _check_depth(path, image.mode, layout, rest if tile.codec_name.startswith("ppm") else [255])
+        _check_depth(path, image.mode, layout, rest if tile.codec_name.startswith("ppm") else [])
+    if image.format == "TIFF" and image.mode.startswith("I") and image.getexif().get(_PHOTOMETRIC) == _WHITE_IS_ZERO:
+        raise ImageError(f"{path}: 0 means white in this 16-bit TIFF; save it with 0 as black")
     if image.mode == "F":
         raise ImageError(
             f"{path}: pixels are F, floats whose range nothing tells; scale both views alike to 0..65535, save 16 bits"
@@ -131,21 +155,21 @@ def _only_previews(image: ImageFile) -> bool:
 
 
 def _check_depth(path: Path, mode: str, layout: object, largest: list[object]) -> None:
-    # What Pillow is about to do is in the tile: it cuts 16-bit colour to 8 bits, and stretches a PPM's odd maxval.
-    if isinstance(layout, str) and ";16" in layout and not mode.startswith("I"):
+    # What Pillow is about to do is in the tile: it cuts 16-bit colour to 8 bits.
+    deep = (isinstance(layout, str) and ";16" in layout) or any(int(str(value)) > _EIGHT_BITS for value in largest)
+    if deep and not mode.startswith("I"):
         raise ImageError(f"{path}: 16-bit colour would be cut to 8 bits; save it as 8-bit colour or 16-bit gray")
-    if largest not in ([], [255]):
-        raise ImageError(f"{path}: largest value {largest[0]}; supported are 255, and 65535 for binary gray")
 
 
 def _decoded(path: Path, file: BinaryIO, header: ImageFile, mode: str) -> _Pixels:
     import imageio.v3 as iio  # sizes and checks need headers only
 
     # imageio lets every format known to Pillow bid for the file, not only those the header was judged by.
+    page = header.tell()
     chosen = Image.open(file).format
     if chosen != header.format:
         raise ImageError(f"{path}: reads as {header.format} and as {chosen}; save it again as PNG")
-    return iio.imread(file, plugin="pillow", index=0, mode=mode)
+    return iio.imread(file, plugin="pillow", index=page, mode=mode)
 
 
 def _upright(array: _Pixels, orientation: int) -> _Pixels:

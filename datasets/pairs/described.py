@@ -31,7 +31,7 @@ import numpy as np
 from semidense.datasets.arrays import DisparityMap, ImageArray
 from semidense.datasets.errors import DatasetError, LayoutError
 from semidense.datasets.formats.calibration.reading import read_cameras
-from semidense.datasets.formats.files import read_bytes
+from semidense.datasets.formats.files import read_bytes, user_path
 from semidense.datasets.formats.images import image_size, read_image
 from semidense.datasets.formats.pfm import read_pfm
 from semidense.datasets.pairs import images
@@ -57,7 +57,7 @@ def list_scenes(argument: str) -> tuple[SceneSource, ...]:
         LayoutError: If a pattern finds nothing, or a left view has no right one.
         DatasetError: If the description, or a file that must be looked into, is not valid.
     """
-    path = Path(argument).expanduser()
+    path = user_path(argument)
     entries = _entries(path)
     found = {role: _matches(path.parent, entries[role]) for role in _ROLES if role in entries}
     missing = sorted(found["left"].keys() - found["right"].keys())
@@ -131,7 +131,7 @@ def _files(found: Mapping[str, Mapping[str, Path]], name: str) -> dict[str, Path
 
 def _source(path: Path, entries: Mapping[str, Any], name: str, files: dict[str, Path]) -> SceneSource:
     calib = files.pop("calib", None)
-    known = read_cameras([calib], entries.get("unit"), files["left"].absolute().parent.name) if calib else None
+    known = read_cameras([calib], entries.get("unit"), str(files["left"].absolute().parent)) if calib else None
     size = image_size(files["left"])
     options = PairOptions(d_min=entries.get("d_min"), d_max=entries.get("d_max"))
     source = SceneSource(**described(name, size, options, known), files=files)

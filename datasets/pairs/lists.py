@@ -1,20 +1,21 @@
 """Read a list of pairs."""
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 from semidense.datasets.errors import LayoutError, MissingFileError
-from semidense.datasets.formats.files import read_bytes
+from semidense.datasets.formats.files import read_text, user_path
 from semidense.datasets.pairs.names import label
 from semidense.datasets.pairs.pairing import Pair, pair_name
 
 LISTS = (".csv", ".txt", ".tsv")
 """Endings of a list of pairs."""
 _SEPARATORS = (",", ";", "\t")
-_HEADER = ["left", "right"]
+_HEADER = [re.compile(rf"{side}([ _-]?(image|view|path|file|img))?", re.IGNORECASE) for side in ("left", "right")]
 _EXPECTED = "expected left,right[,calibration]"
 _LARGEST_LIST = 1 << 22
 
@@ -23,13 +24,13 @@ def read_list(path: Path) -> list[Pair]:
     """Read a list of pairs: a line each, ``left,right`` or ``left,right,calibration``, relative to the list's folder.
 
     A semicolon or a tab may stand for the comma. Empty lines, lines that start with ``#`` and a first line
-    ``Left,Right...`` are passed over.
+    ``Left,Right...`` or ``left_image,right_image...`` are passed over, as are empty fields at a line's end.
 
     Raises:
         MissingFileError: If the list or a file in it does not exist.
         LayoutError: If a line has other fields, or there is no pair.
     """
-    lines = _text(path).splitlines()
+    lines = read_text(path, _LARGEST_LIST, LayoutError, "list of pairs").splitlines()
     pairs = [_pair(path, number, fields) for number, fields in _rows(lines, _separator(path, lines))]
     if not pairs:
         raise LayoutError(f"{path}: names no pair; write left,right[,calibration], a line each")
@@ -43,9 +44,13 @@ def _rows(lines: list[str], separator: str) -> Iterator[tuple[int, list[str]]]:
         fields = [item.strip() for item in row]
         if not any(fields) or fields[0].startswith("#"):
             continue
-        if not (first and [item.casefold() for item in fields[:2]] == _HEADER):
+        if not (first and _is_header(fields)):
             yield number, fields
         first = False
+
+
+def _is_header(fields: list[str]) -> bool:
+    return len(fields) > 1 and all(head.fullmatch(item) for head, item in zip(_HEADER, fields, strict=False))
 
 
 def _separator(path: Path, lines: list[str]) -> str:
@@ -58,6 +63,8 @@ def _separator(path: Path, lines: list[str]) -> str:
 
 
 def _pair(path: Path, number: int, fields: list[str]) -> Pair:
+    while fields and not fields[-1]:  # as spreadsheets write them
+        fields = fields[:-1]
     if len(fields) not in (2, 3, 4) or not all(fields):
         raise LayoutError(f"{path}, line {number}: {','.join(fields)[:60]!r}; {_EXPECTED}")
     files = [_place(path, item) for item in fields]
@@ -68,19 +75,14 @@ def _pair(path: Path, number: int, fields: list[str]) -> Pair:
 
 
 def _place(path: Path, item: str) -> Path:
-    return path.parent / Path(item).expanduser()
-
-
-def _text(path: Path) -> str:
-    try:
-        return read_bytes(path, _LARGEST_LIST, LayoutError, "list of pairs").decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise LayoutError(f"{path}: no plain text; {_EXPECTED}, a line each") from error
+    return path.parent / user_path(item)
 
 
 def _distinct(pairs: list[Pair]) -> list[Pair]:
     """Name pairs of one name by their folder too, and those that are still alike by their place in the list."""
-    pairs = _renamed(pairs, [f"{pair.left.resolve().parent.name}/{label(pair.left.stem)}" for pair in pairs])
+    pairs = _renamed(
+        pairs, [f"{pair.left.resolve().parent.name}/{label(pair.left.stem) or pair.left.stem}" for pair in pairs]
+    )
     return _renamed(pairs, [f"{pair.name}-{place}" for place, pair in enumerate(pairs, start=1)])
 
 

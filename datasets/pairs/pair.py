@@ -23,6 +23,7 @@ from semidense.datasets.errors import DatasetError
 from semidense.datasets.formats.calibration.cameras import PairCalibration
 from semidense.datasets.formats.calibration.reading import read_cameras
 from semidense.datasets.formats.costs import costs_shape
+from semidense.datasets.formats.files import user_path
 from semidense.datasets.formats.images import image_size
 from semidense.datasets.pairs.lists import LISTS, read_list
 from semidense.datasets.pairs.options import PATTERN, PairOptions, parse
@@ -52,7 +53,7 @@ def _listed(sides: list[str], options: PairOptions) -> list[Pair]:
         return [Pair(pair_name(path), path, path) for path in image_files(sides[0])]
     if len(sides) == 2:
         return find_pairs(*sides)
-    path = Path(sides[0]).expanduser()
+    path = user_path(sides[0])
     if path.suffix.lower() not in LISTS:
         raise DatasetError(
             f"{path}: one path alone must be a list ({', '.join(LISTS)}), or both views with split=; write {PATTERN}"
@@ -62,14 +63,14 @@ def _listed(sides: list[str], options: PairOptions) -> list[Pair]:
 
 def _calibration_of(pair: Pair, options: PairOptions) -> tuple[tuple[Path, ...], str]:
     """Return the calibration's files, and the folder that may tell which of its cameras they are."""
-    files = tuple(Path(name).expanduser() for name in options.calib) or pair.calib
-    return files, pair.left.absolute().parent.name
+    files = tuple(map(user_path, options.calib)) or pair.calib
+    return files, str(pair.left.absolute().parent)
 
 
 def _source(pair: Pair, options: PairOptions, known: PairCalibration | None) -> SceneSource:
     files = {"left": pair.left, "right": pair.right}
     if options.costs:
-        files["costs"] = Path(options.costs).expanduser()
+        files["costs"] = user_path(options.costs)
         options = _with_range_of_costs(files["costs"], options)
     source = SceneSource(**described(pair.name, _view_size(pair, options), options, known), files=files)
     return replace(source, warnings=(*pair.warnings, *source.warnings))

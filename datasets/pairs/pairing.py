@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from semidense.datasets.errors import LayoutError, MissingFileError
+from semidense.datasets.formats.files import user_path
 from semidense.datasets.pairs.names import Side, composed, label, look_alike, without_side
 
 _IMAGES = (".png", ".jpg", ".jpeg", ".mpo", ".tif", ".tiff", ".bmp", ".ppm", ".pgm")
@@ -47,7 +48,7 @@ def find_pairs(left: str, right: str) -> list[Pair]:
         LayoutError: If no pair is found, two files of one side have the same name, or names look alike but are not
             certain to belong together.
     """
-    sides = [Path(text).expanduser() for text in (left, right)]
+    sides = [user_path(text) for text in (left, right)]
     if any("*" in text for text in (left, right)) and not any(side.exists() for side in sides):
         return _labelled(_paired(_matches(left), _matches(right), (left, right)))
     for side in sides:
@@ -66,7 +67,7 @@ def image_files(place: str) -> list[Path]:
     Raises:
         MissingFileError: If there is none.
     """
-    path = Path(place).expanduser()
+    path = user_path(place)
     if "*" in place and not path.exists():
         return list(_matches(place).values())
     if path.is_dir():
@@ -162,7 +163,7 @@ def _matches(pattern: str) -> _Keyed:
     """Return the files that a pattern fits, by what its one ``*`` stands for."""
     if pattern.count("*") != 1:
         raise LayoutError(f"{pattern}: give exactly one * in each of the two patterns; it pairs them")
-    path = Path(pattern).expanduser()
+    path = user_path(pattern)
     if "*" not in path.name:
         raise LayoutError(f"{pattern}: the * must stand in the file's name")
     before, after = (composed(part) for part in path.name.split("*"))

@@ -53,6 +53,15 @@ def _change_row(change: Change) -> dict[str, Any]:
     return {"field": change.field, "old": change.old, "new": change.new}
 
 
+def show_plan(plan: Plan, store: Store, as_json: bool) -> None:
+    """Print a plan and how long it will take, as a table or as JSON."""
+    time = estimate(plan, store)
+    if as_json:
+        print_json({"steps": step_rows(plan, {}), "metrics": [], "estimate_seconds": time.seconds})
+    else:
+        print_plan(plan, time)
+
+
 def print_plan(plan: Plan, time: Estimate) -> None:
     """Print a line a product and scene: its state, its key, and why it is not a hit; then how long a run takes."""
     table = Table("product", "scene", "state", "key", "why", box=None, pad_edge=False)

@@ -1,10 +1,13 @@
 """The arguments and options that several commands take, each said once."""
 
+import json
 import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from semidense.pipeline.plan.presets import DEFAULT
 
 DatasetArgument = Annotated[
     str, typer.Argument(help="Scenes to work on, such as motorcycle or middlebury:DIR; `pipeline data list` names all.")
@@ -17,11 +20,11 @@ SetOption = Annotated[
     typer.Option("--set", help="Change a setting: section.field=value; repeat the option for several."),
 ]
 PresetOption = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--preset",
         help="Settings to start from: paper (the method of the paper), or robust (fewer wrong pixels where texture is "
-        "thin).",
+        "thin) [default: that of a config.json; else robust for match, paper for others].",
     ),
 ]
 ModeOption = Annotated[
@@ -46,6 +49,12 @@ CacheOption = Annotated[
 ]
 TrainOption = Annotated[
     bool, typer.Option("--train", help="Train the networks instead of using the weights that come with the package.")
+]
+VerboseOption = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Name every product that is made, not only the slow ones.")
+]
+QuietOption = Annotated[
+    bool, typer.Option("--quiet", "-q", help="Print results and warnings only: no progress, no estimate of the time.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object on stdout.")]
 OutputOption = Annotated[
@@ -80,6 +89,24 @@ def chosen(settings: list[str] | None, mode: str | None) -> tuple[str, ...]:
 
 def config_file(config: Path | None) -> Path | None:
     """Return the file of settings: ``--config``, else ``$PIPELINE_CONFIG``, else ``./pipeline.toml`` if it is there."""
-    named = os.environ.get("PIPELINE_CONFIG")
-    beside = Path("pipeline.toml")
-    return config or (Path(named).expanduser() if named else beside if beside.is_file() else None)
+    if config or not (named := os.environ.get("PIPELINE_CONFIG")):
+        beside = Path("pipeline.toml")
+        return config or (beside if beside.is_file() else None)
+    from semidense.datasets.formats.files import user_path
+
+    return user_path(named)
+
+
+def chosen_preset(preset: str | None, config: Path | None, default: str = DEFAULT) -> str:
+    """Return ``--preset``, else the preset of the run that wrote the file of settings, else the command's default."""
+    file = config_file(config)
+    return preset or (file and _recorded_preset(file)) or default
+
+
+def _recorded_preset(file: Path) -> str | None:
+    """Return the preset in a ``config.json``; None if there is none, also in a file that will be refused later."""
+    try:
+        found = json.loads(file.read_text())["preset"] if file.suffix == ".json" else None
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return None
+    return found if isinstance(found, str) else None

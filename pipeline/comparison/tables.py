@@ -11,7 +11,7 @@ from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.paper_figures import QUOTED
 from semidense.pipeline.comparison.rows import Row
 from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, mean_name
-from semidense.pipeline.results.text import results
+from semidense.pipeline.results.text import print_in_parts, results
 
 TITLES = {
     "raw": "Raw maps: wrong or unreported pixels, %",
@@ -49,9 +49,9 @@ def print_comparison(found: Comparison, masks: Iterable[str], threshold: float =
     for experiment, figure in (("raw", "raw_bad"), ("auc", "auc")):
         if of(rows, experiment):
             table = _by_scene(of(rows, experiment), of(means, experiment), experiment, figure)
-            console.print(_fitted(table, console), "")
+            print_in_parts(_fitted(table, console), console)
     if of(rows, "density"):
-        console.print(_fitted(_density_table(of(means, "density")), console), "")
+        print_in_parts(_fitted(_density_table(of(means, "density")), console), console)
     _print_quoted(console, quoted(found))
     kinds = ", ".join(sorted(set(masks)))
     console.print()
@@ -121,7 +121,7 @@ def _print_quoted(console: Console, quoted: Sequence[Row]) -> None:
 def _table(title: str, *columns: str) -> Table:
     table = Table(*(escape(column) for column in columns), title=title, title_justify="left", box=None, pad_edge=False)
     for column in table.columns[1:]:
-        column.justify = "right"
+        column.justify, column.no_wrap = "right", True
     return table
 
 

@@ -26,11 +26,14 @@ class ProgressWatch:
 
     Args:
         announce: called with the plan and the cache before each run begins, such as to print how long it will take.
+        detail: -1 says nothing; 0 names products that took a second or more; 1 names every product that is made.
     """
 
-    def __init__(self, announce: Callable[[Plan, Store], None] | None = None) -> None:
-        self._announce = announce
-        self._console = Console(stderr=True)
+    def __init__(self, announce: Callable[[Plan, Store], None] | None = None, detail: int = 0) -> None:
+        self._announce = announce if detail >= 0 else None
+        self._detail = detail
+        self._expected = False
+        self._console = Console(stderr=True, quiet=detail < 0)
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -39,7 +42,7 @@ class ProgressWatch:
             TextColumn("{task.fields[note]}", style="dim", markup=False),
             console=self._console,
             transient=True,
-            disable=not sys.stderr.isatty(),
+            disable=detail < 0 or not sys.stderr.isatty(),
         )
         self._whole = self._bar.add_task("products", total=None, note="", visible=False)
         self._finished = 0
@@ -58,8 +61,15 @@ class ProgressWatch:
         if self._compiling:
             self._compiling.stop()
 
+    def expect(self, plan: Plan, store: Store) -> None:
+        """Take the plan of several runs as one: there is one announcement and one bar for all of them."""
+        self.planned(plan, store)
+        self._expected = True
+
     def planned(self, plan: Plan, store: Store) -> None:
         """Begin the bar anew: one step for each product to make."""
+        if self._expected:
+            return
         if self._announce:
             self._announce(plan, store)
         with self._lock:
@@ -118,10 +128,12 @@ class ProgressWatch:
             self._rows.pop(made.step.id, None)
             self._finished += 1
             self._show()
-            if not made.reused and made.seconds >= 1.0:
-                self._console.print(
-                    f"made {made.step.name} in {made.seconds:.1f} s", highlight=False, soft_wrap=True, markup=False
-                )
+            if self._detail > 0 or (not made.reused and made.seconds >= 1.0):
+                self._console.print(_result_line(made), highlight=False, soft_wrap=True, markup=False)
+
+
+def _result_line(made: Made) -> str:
+    return f"reused {made.step.name}" if made.reused else f"made {made.step.name} in {made.seconds:.1f} s"
 
 
 class _Row:

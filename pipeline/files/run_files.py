@@ -138,11 +138,12 @@ class _Exporter:
         """Write the command, the versions, the settings that each result was made with, and all files there are."""
         targets = [self._described(*target) for target in self.result.plan.targets]
         files = {path.relative_to(self.folder).as_posix() for path in self.written} | {*earlier, CONFIG}
-        document = provenance(sys.argv) | {"configuration": targets, "files": sorted(files)}
+        settings = {"preset": self.result.preset, "configuration": targets}
+        document = provenance(sys.argv) | settings | {"files": sorted(files)}
         self._write(self.folder / CONFIG, (json.dumps(document, indent=2) + "\n").encode())
 
     def _described(self, step_id: str, variant: str) -> dict[str, Any]:
-        """Return the settings and keys of a result and of everything it was made from."""
+        """Return all sections of a result's configuration; settings and keys of it and of what it was made from."""
         target = self.result.made[step_id].step
         steps = {step.product: step for step in reversed(lineage(self.result.made, step_id))}
         return {
@@ -150,6 +151,7 @@ class _Exporter:
             "scene": target.scene,
             "folder": self.scenes[target.scene],
             "variant": variant,
+            "sections": target.configuration,
             "settings": {product: step.settings for product, step in steps.items()},
             "keys": {product: self.result.made[step.id].key for product, step in steps.items()},
         }

@@ -179,7 +179,8 @@ class _Writer:
 
     def write_summary(self) -> dict[str, Any]:
         """Write and return the summary."""
-        about = summary(self.match) | {"notes": self.notes, "files": self.files}
+        notes = [*_calibration_notes(self.match), *self.notes]
+        about = summary(self.match) | {"notes": notes, "files": self.files}
         (self.folder / _SUMMARY).write_text(json.dumps(about, indent=2, allow_nan=False) + "\n")
         return about
 
@@ -197,6 +198,17 @@ def _basis(match: Match) -> dict[str, Any]:
         "R_basis": f"{words}; {match.basis.words}",
         "expected_error_percent": None if expected is None else 100 * expected,
     }
+
+
+def _calibration_notes(match: Match) -> list[str]:
+    """Say so if the calibration was measured with other cost volumes than those of the match."""
+    if not match.wishes.calibrated and match.wishes.max_error is None:
+        return []
+    mode = match.made("costvolume").step.settings.get("mode")
+    shipped = getattr(match.made("calibration").step.argument, "name", "")
+    if (mode, shipped) != ("fast", "calibration"):
+        return []
+    return ["the calibration was measured with exact cost volumes, and is used for these fast ones"]
 
 
 def summary(match: Match) -> dict[str, Any]:
@@ -221,6 +233,8 @@ def summary(match: Match) -> dict[str, Any]:
         "warnings": match.warnings,
         "seconds": {each.step.product: each.seconds for each in steps},
         "reused": [each.step.product for each in steps if each.reused],
+        "preset": match.result.preset,
+        "configuration": [{"sections": dict(match.made("semidense").step.configuration)}],
         "settings": {each.step.product: dict(each.step.settings) for each in steps},
         "keys": {each.step.product: each.key for each in steps},
     } | provenance(sys.argv)

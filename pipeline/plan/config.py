@@ -127,25 +127,25 @@ def _choices(name: str, products: Iterable[str]) -> type[Params]:
 
 
 def _read_file(file: Path) -> dict[str, Any]:
-    """Return the sections of a TOML file, or of the ``config.json`` that a run wrote."""
+    """Return the sections of a TOML file, or of the JSON file that a run or a match wrote beside its results."""
     return _read_exported(file) if file.suffix == ".json" else _read_toml(file)
 
 
 def _read_exported(file: Path) -> dict[str, Any]:
-    """Return the settings of a ``config.json``; ranges of disparities are left out: each scene has its own."""
+    """Return the settings of a ``config.json`` or ``summary.json``, without ranges: each scene has its own."""
     try:
-        found = [_set_by_users(each["settings"]) for each in json.loads(file.read_text())["configuration"]]
+        found = [_set_by_users(each["sections"]) for each in json.loads(file.read_text())["configuration"]]
     except OSError as error:
         raise UsageError(f"configuration {file}: {error.strerror}") from None
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
-        raise UsageError(f"configuration {file}: it is no config.json that run --output wrote") from None
+        raise UsageError(f"configuration {file}: it is no config.json or summary.json of this version") from None
     if not found or any(each != found[0] for each in found):
         raise UsageError(f"configuration {file}: it holds {len(found)} sets of settings that differ; give a TOML file")
     return found[0]
 
 
 def _set_by_users(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Return those of the settings of steps that a configuration has and that no run fills in by itself."""
+    """Return those of the settings in a file that a configuration has and that no run fills in by itself."""
     known = _model(tuple(STAGES)).model_fields
     taken = {name: getattr(known[name].annotation, "model_fields", {}).keys() - _FILLED_IN for name in known}
     return {

@@ -7,6 +7,7 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+from semidense.datasets.formats.files import user_path
 from semidense.pipeline.plan.config import Config
 from semidense.stages.catalog import STAGES
 from semidense.stages.matching.declaration import CostVolumeParams, Mode
@@ -59,7 +60,7 @@ def weights_of(config: Config, product: str) -> Weights:
         StageError: if the file cannot be read, or this installation has none for such a configuration.
     """
     if file := config.choice("weights", product):
-        return own_weights(product, Path(file).expanduser())
+        return own_weights(product, user_path(file))
     made_by = [config.choice("use", name) or name for name in _CALIBRATED]
     return shipped_weights(product, config.of("costvolume", CostVolumeParams).mode, *made_by)
 

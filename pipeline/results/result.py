@@ -11,6 +11,7 @@ from semidense.cache import Store
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.images_and_truth import MASK_KINDS
 from semidense.pipeline.plan.plan import Made, Plan
+from semidense.pipeline.plan.presets import DEFAULT
 from semidense.pipeline.results.opening import open_product
 
 if TYPE_CHECKING:
@@ -29,12 +30,14 @@ class Result:
         made: the result of each step, by its id.
         store: the cache.
         metrics: rows as promised to scripts; empty if the run stopped before ``metrics``.
+        preset: the named settings that it started from.
     """
 
     plan: Plan
     made: Mapping[str, Made]
     store: Store
     metrics: list[dict[str, Any]] = field(default_factory=list)
+    preset: str = DEFAULT
 
     def find(self, product: str, scene: str | None = None) -> Made:
         """Return the result of a product; of a scene, if there are several.

@@ -65,10 +65,21 @@ def print_table(table: Table, console: Console, spare: Sequence[str]) -> None:
         if _width(table, console) <= console.width:
             break
         out.append(head)
-        table = _without(table, head)
+        table = _only(table, [str(column.header) for column in table.columns if column.header != head])
     console.print(table)
     if out:
         console.print(f"left out at this width: {', '.join(out)}; --json has all", style="dim", markup=False)
+
+
+def print_in_parts(table: Table, console: Console) -> None:
+    """Print a table; where it is too wide, print it as several, each with the first column. No number is cut."""
+    heads = [str(column.header) for column in table.columns]
+    while len(heads) > 1:
+        part = heads[:2]
+        while len(part) < len(heads) and _width(_only(table, heads[: len(part) + 1]), console) <= console.width:
+            part = heads[: len(part) + 1]
+        console.print(_only(table, part), "")
+        heads = [heads[0], *heads[len(part) :]]
 
 
 def _width(table: Table, console: Console) -> int:
@@ -76,8 +87,9 @@ def _width(table: Table, console: Console) -> int:
     return console.measure(table, options=console.options.update(width=1000)).maximum
 
 
-def _without(table: Table, head: str) -> Table:
-    kept = [column for column in table.columns if column.header != head]
+def _only(table: Table, heads: Sequence[str]) -> Table:
+    """Return a table of some of the columns."""
+    kept = [column for column in table.columns if str(column.header) in heads]
     narrower = Table(box=None, pad_edge=table.pad_edge, title=table.title, title_justify=table.title_justify)
     for column in kept:
         narrower.add_column(column.header, justify=column.justify, no_wrap=column.no_wrap)

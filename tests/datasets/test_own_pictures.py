@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, TiffImagePlugin
 
 from semidense.datasets import Calibration, DatasetError, ImageError, open_dataset
 from semidense.datasets.formats.calibration.reading import read_cameras
@@ -63,6 +63,16 @@ def ros(folder: Path) -> list[Path]:
     return [text(folder / f"{side}.yaml", message.format(each.replace(" ", ", ")))[0] for side, each in sides]
 
 
+def ini(folder: Path) -> list[Path]:
+    camera = "[image]\nwidth\n640\nheight\n480\n[{}]\nprojection\n{}\n"
+    return text(folder / "ost.txt", camera.format("left", BESIDE) + camera.format("right", MOVED))
+
+
+def cityscapes(folder: Path) -> list[Path]:
+    parts = {"intrinsic": {"fx": 500, "fy": 500, "u0": 311, "v0": 250}, "extrinsic": {"baseline": 0.12, "yaw": 0.1}}
+    return text(folder / "camera.json", json.dumps(parts))
+
+
 def karlsruhe(folder: Path) -> list[Path]:
     return text(folder / "c.txt", f"roi: 26 665 70 549\nP1: {P2}\nP1_roi: {P1}\nP2: {P1}\nP2_roi: {P2}\n")
 
@@ -83,6 +93,7 @@ CALIBRATIONS: dict[str, Made] = {
     "OpenCV, projections": (projections, "m", 30, None),
     "OpenCV, reprojection": (reprojection, "m", 30, None),
     "ROS `CameraInfo`": (ros, None, 30, (480, 640)),
+    "ROS `.ini`": (ini, None, 30, (480, 640)),
     "KITTI, benchmarks": (lambda folder: text(folder / "c.txt", f"P2: {BESIDE}\nP3: {MOVED}\n"), None, 30, None),
     "KITTI, raw data": (
         lambda folder: text(folder / "c.txt", f"S_rect_02: 640 480\nP_rect_02: {BESIDE}\nP_rect_03: {MOVED}\n"),
@@ -92,7 +103,8 @@ CALIBRATIONS: dict[str, Made] = {
     ),
     "Karlsruhe": (karlsruhe, None, 30, (480, 640)),
     "`K.txt`": (lambda folder: text(folder / "K.txt", f"{K}\n0.12\n"), None, 0, None),
-    "JSON, YAML": (own_json, None, 30, None),
+    "JSON, YAML, TOML": (own_json, None, 30, None),
+    "Cityscapes": (cityscapes, "m", 0, None),
     "stereo sensor": (sensor, None, 0, (480, 640)),
 }
 
@@ -180,9 +192,26 @@ def formats(folder: Path) -> tuple[Path, Path]:
     return folder / "l.png", folder / "r.bmp"
 
 
+def with_preview(folder: Path) -> tuple[Path, Path]:
+    for name in ("l.tif", "r.tif"):
+        with TiffImagePlugin.AppendingTiffWriter(str(folder / name), True) as file:
+            for kind, size in ((1, (3, 2)), (0, (6, 4))):
+                Image.new("L", size, 77).save(file, "TIFF", tiffinfo={254: kind})
+                file.newFrame()
+    return folder / "l.tif", folder / "r.tif"
+
+
+def gray_maps(folder: Path) -> tuple[Path, Path]:
+    for name in ("l.pgm", "r.pgm"):
+        (folder / name).write_bytes(b"P5\n6 4\n1023\n" + np.full((4, 6), 1023, ">u2").tobytes())
+    return folder / "l.pgm", folder / "r.pgm"
+
+
 GRAY = np.full((4, 6), 77)
 PICTURES = {
     "PNG, JPEG, TIFF, BMP, PPM": (formats, 77),
+    "TIFF with previews or masks": (with_preview, 77),
+    "PGM with another largest value": (gray_maps, 65535),
     "JPEG with a preview (MPO)": (previews, 77),
     "16-bit gray": (depths((GRAY * 0 + 4095).astype(np.uint16), GRAY.astype(np.uint16)), 65535),
     "32-bit whole numbers": (depths((GRAY * 0 + 4095).astype(np.int32), GRAY.astype(np.int32)), 65535),

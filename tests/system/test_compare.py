@@ -12,11 +12,13 @@ import pytest
 from semidense.datasets import open_dataset
 from semidense.pipeline import compare
 from semidense.pipeline.api import Task
+from semidense.pipeline.comparison import prepared
 from semidense.pipeline.comparison.ablation import ABLATION
-from semidense.pipeline.comparison.experiments import BESIDE, EXPERIMENTS, Comparison
+from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.files import COLUMNS, write_comparison
 from semidense.pipeline.comparison.methods import LOWERED, MATCHERS, MEASURES
 from semidense.pipeline.comparison.paper_figures import NAMED, QUOTED
+from semidense.pipeline.comparison.prepared import BESIDE, EXPERIMENTS
 from semidense.pipeline.comparison.protocols import protocol_requests
 from semidense.pipeline.comparison.tables import print_comparison
 from semidense.pipeline.pages.report import report
@@ -158,12 +160,19 @@ def test_what_needs_training_says_so_without_a_training_set(found: Comparison, t
     assert not methods(plain, "density")
 
 
+def test_the_plan_of_a_comparison_holds_every_product_of_all_its_runs_once(found: Comparison, task: Task) -> None:
+    plan = prepared.prepare(task, train_on=SPEC).plan()
+    assert plan.todo() == ()
+    ids = [each.step.id for each in plan.steps]
+    assert len(set(ids)) == len(ids)
+    assert {*found.result.made} < {*ids}, "the runs of other presets and networks are in it too"
+
+
 def test_without_a_package_its_rows_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    from semidense.pipeline.comparison import experiments as comparison
     from semidense.pipeline.plan import environment
 
     monkeypatch.setattr(environment, "_installed", lambda _: False)
-    products, unavailable = comparison._available(EXPERIMENTS, True, ())
+    products, unavailable = prepared._available(EXPERIMENTS, True, ())
     reasons = {each["method"]: each["why"] for each in unavailable}
     assert products == ("sncc", "census", "cost_confidence", "ccnn")
     assert "opencv-python-headless" in reasons["SGM (OpenCV SGBM)"] and "mccnn" in reasons["MC-CNN fast"]

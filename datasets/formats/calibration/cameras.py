@@ -21,7 +21,18 @@ from semidense.datasets.scene import Calibration
 
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
 """Millimetres of each unit that a calibration may be in."""
+_SHORT = {"millimeter": "mm", "centimeter": "cm", "meter": "m"}
+UNDERSTOOD = (
+    "Middlebury's calib.txt (cam0=[...]); OpenCV's YAML, XML or JSON (P1 and P2, or Q); ROS's CameraInfo or .ini, a "
+    "left and a right file; KITTI's (P2: ..., P_rect_02: ..., P1_roi: ...); a K.txt of nine numbers and the baseline "
+    "in metres; JSON, YAML or TOML with fx, fy, cx, cy or K, and baseline; a stereo sensor's camera.A=[...] and t=..."
+)
+"""The formats of calibrations that are read, for messages."""
 VERTICAL = "the cameras stand one above the other; only a pair side by side can be matched"
+_USUAL = (1.0, 10_000.0)
+"""Baselines outside of this are rare, and more often a wrong unit; millimetres."""
+_FIXED = ((1, 0), (2, 0), (2, 1), (2, 2))
+"""Entries of a projection matrix that every camera has alike: 0, 0, 0 and 1."""
 _SAME = 1e-6
 _SAME_ROWS = 1e-3
 """Relative difference of two focal lengths along y that shifts no row by more than a pixel."""
@@ -29,6 +40,11 @@ _SAME_PIXEL = 0.05
 """Difference of two principal points that rounding in a file may cause, pixels."""
 _SAME_SHAPE = 0.01
 """Relative difference of the two sides' scales that rounding a size to whole pixels may cause."""
+
+
+def unknown_format(path: Path, hint: str = "") -> CalibrationError:
+    """Return the error for a file that is no known calibration; it lists what is understood."""
+    return CalibrationError(f"{path}: no known calibration format{hint}. Known are: {UNDERSTOOD}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +55,7 @@ class Cameras:
         path: The file, for messages.
         left: (3, 4) projection matrix of the left camera, pixels; its last column pixels times the unit of length.
         right: The right camera's.
-        unit: Unit of length: ``mm``, ``cm`` or ``m``; None if the file does not tell.
+        unit: Unit of length as the file names it, such as ``mm`` or ``meters``; None if it does not tell.
         size: Rows and columns of the images; None if the file does not tell.
         ndisp: Number of disparities to search, from 0 on; None if the file does not tell.
         doffs: ``doffs`` as the file states it; None where only the matrices tell.
@@ -111,17 +127,41 @@ def calibrated(cameras: Cameras, unit: str | None = None) -> PairCalibration:
     Raises:
         CalibrationError: If no unit is known, or the cameras are no rectified pair side by side.
     """
-    unit = unit or cameras.unit
-    if unit is None:
-        raise CalibrationError(f"{cameras.path}: the file does not tell its unit of length; give unit mm, cm or m")
+    scale = _millimetres(cameras.path, unit or cameras.unit)
     left, right = cameras.left, cameras.right
     focal = _shared_focal(cameras)
-    baseline = _shift(cameras) / focal * MILLIMETRES[unit]
+    _require_pinholes(cameras)
+    baseline = _shift(cameras) / focal * scale
     doffs = float(right[0, 2] - left[0, 2]) if cameras.doffs is None else cameras.doffs
     focal_y = None if abs(left[1, 1] - focal) <= _SAME * focal else float(left[1, 1])
     centre = (float(left[0, 2]), float(left[1, 2]))
     known = Calibration(focal, baseline, doffs, centre, focal_y, float(left[0, 1]))
-    return PairCalibration(known, cameras.size, cameras.ndisp, (*cameras.warnings, *_contradictions(cameras)))
+    warnings = (*cameras.warnings, *_contradictions(cameras), *_unusual(cameras.path, baseline))
+    return PairCalibration(known, cameras.size, cameras.ndisp, warnings)
+
+
+def _millimetres(path: Path, unit: str | None) -> float:
+    """Return the millimetres of a unit, whose name may be written out."""
+    if unit is None:
+        raise CalibrationError(f"{path}: the file does not tell its unit of length; give unit mm, cm or m")
+    name = unit.strip().lower().rstrip("s").replace("metre", "meter")
+    short = _SHORT.get(name, name)
+    if short not in MILLIMETRES:
+        raise CalibrationError(f"{path}: unit {unit!r} of length is not known; give unit mm, cm or m")
+    return MILLIMETRES[short]
+
+
+def _require_pinholes(cameras: Cameras) -> None:
+    for side, projection in (("left", cameras.left), ("right", cameras.right)):
+        if not np.allclose([projection[place] for place in _FIXED], [0, 0, 0, 1]):
+            raise CalibrationError(
+                f"{cameras.path}: the {side} camera matrix is not [fx s cx; 0 fy cy; 0 0 1]; is it transposed?"
+            )
+
+
+def _unusual(path: Path, baseline: float) -> Iterator[str]:
+    if not _USUAL[0] <= baseline <= _USUAL[1]:
+        yield f"{path}: the cameras stand {baseline:g} mm apart; if that is wrong, give the file's unit: mm, cm or m"
 
 
 def _shared_focal(cameras: Cameras) -> float:

@@ -5,7 +5,7 @@
     754.6680 0.0 489.3794 0.0 754.6680 265.1617 0.0 0.0 1.0
     0.0630
 
-Both views share the principal point. The numbers may stand on any lines.
+Both views share the principal point. The numbers may stand on any lines; comments follow a ``#``.
 """
 
 from pathlib import Path
@@ -14,13 +14,13 @@ import numpy as np
 
 from semidense.datasets.errors import CalibrationError
 from semidense.datasets.formats.calibration.cameras import Cameras
-from semidense.datasets.formats.calibration.text import matrix
+from semidense.datasets.formats.calibration.text import matrix, without_comments
 
 
 def numbers_only(text: str) -> list[float]:
-    """Return a text's numbers, or nothing if it holds anything else."""
+    """Return a text's numbers, or nothing if it holds anything else but comments."""
     try:
-        return [float(item) for item in text.replace(",", " ").split()]
+        return [float(item) for item in without_comments(text).replace(",", " ").split()]
     except ValueError:
         return []
 

@@ -7,8 +7,8 @@
 | ``P0`` to ``P3`` | the stereo, object and odometry benchmarks | gray 0, 1; colour 2, 3 |
 | ``P1`` and ``P2`` | Karlsruhe's without ``roi`` | left, right |
 
-Every ``P`` is a 3 x 4 projection matrix, row by row. The left camera's last column counts: that of KITTI's colour
-camera is not 0. Source: https://www.cvlibs.net/datasets/kitti/setup.php
+Every ``P`` is a 3 x 4 projection matrix, row by row; comments follow a ``#``. The left camera's last column counts:
+that of KITTI's colour camera is not 0. Source: https://www.cvlibs.net/datasets/kitti/setup.php
 """
 
 import re
@@ -19,9 +19,9 @@ import numpy as np
 
 from semidense.datasets.errors import CalibrationError
 from semidense.datasets.formats.calibration.cameras import Cameras
-from semidense.datasets.formats.calibration.text import Matrix, matrix
+from semidense.datasets.formats.calibration.text import Matrix, matrix, without_comments
 
-_LINE = re.compile(r"^(\w+):((?:[ \t]+[-+.\deE]+)+)[ \t]*$", re.MULTILINE)
+_LINE = re.compile(r"^[ \t]*(\w+)[ \t]*:((?:[ \t,]+[-+.\deE]+)+)[ \t]*$", re.MULTILINE)
 _SYSTEMS = (("P1_roi", "P2_roi"), ("P_rect_02", "P_rect_03"), ("P_rect_00", "P_rect_01"), ("P2", "P3"), ("P0", "P1"))
 _FOLDERS = {"image_0": "0", "image_00": "0", "image_2": "2", "image_02": "2", "colored_0": "2"}
 """Number of the camera that a left view's folder tells."""
@@ -30,7 +30,7 @@ _WANTED = "expected P2 and P3, P0 and P1, P_rect_02 and P_rect_03, or P1_roi and
 
 def is_kitti(text: str) -> bool:
     """Tell whether a text has a projection matrix as KITTI writes it."""
-    return re.search(r"^P(_rect_0)?\d(_roi)?:[ \t]+[-+.\d]", text, re.MULTILINE) is not None
+    return re.search(r"^[ \t]*P(_rect_0)?\d(_roi)?[ \t]*:[ \t]+[-+.\d]", text, re.MULTILINE) is not None
 
 
 def kitti_cameras(path: Path, text: str, folder: str | None = None) -> Cameras:
@@ -39,34 +39,40 @@ def kitti_cameras(path: Path, text: str, folder: str | None = None) -> Cameras:
     Args:
         path: The file, for messages.
         text: Its content.
-        folder: Name of the left view's folder: ``image_0`` and ``image_00`` mean the gray cameras, ``image_2``,
-            ``image_02`` and ``colored_0`` the colour ones. Elsewhere the colour cameras are taken, and a warning gives
-            both baselines.
+        folder: Path of the left view's folder: ``image_0`` and ``image_00`` mean the gray cameras, ``image_2``,
+            ``image_02`` and ``colored_0`` the colour ones, as do folders in them (``image_00/data``). Elsewhere the
+            colour cameras are taken, and a warning gives both baselines.
 
     Raises:
         CalibrationError: If there are no two cameras that belong together.
     """
-    lines = {name: numbers.split() for name, numbers in _LINE.findall(text)}
+    found = _LINE.findall(without_comments(text))
+    lines = {name: numbers.replace(",", " ").split() for name, numbers in found}
     pairs = [pair for pair in (*_SYSTEMS, ("P1", "P2")) if set(pair) <= lines.keys()]
     if not pairs:
         raise CalibrationError(f"{path}: no two cameras; {_WANTED}")
-    chosen = _chosen(pairs, folder)
+    camera = _number(folder)
+    chosen = _chosen(pairs, camera)
     left, right = (matrix(path, name, lines[name], (3, 4)) for name in chosen)
-    return Cameras(path, left, right, "m", _size(path, lines, chosen[0]), warnings=_unsure(path, lines, pairs, folder))
+    warnings = () if camera else _unsure(path, lines, pairs)
+    return Cameras(path, left, right, "m", _size(path, lines, chosen[0]), warnings=warnings)
 
 
-def _chosen(pairs: list[tuple[str, str]], folder: str | None) -> tuple[str, str]:
-    """Return the pair whose left camera has the number of the folder, else the first one."""
-    number = _FOLDERS.get(folder or "")
+def _number(folder: str | None) -> str | None:
+    """Return the number of the left camera that the innermost telling name of a folder's path means."""
+    names = reversed(Path(folder or "").parts)
+    return next((_FOLDERS[name] for name in names if name in _FOLDERS), None)
+
+
+def _chosen(pairs: list[tuple[str, str]], number: str | None) -> tuple[str, str]:
+    """Return the pair whose left camera has the number, else the first one."""
     same = [pair for pair in pairs if number and pair[0] in (f"P{number}", f"P_rect_0{number}")]
     return (same or pairs)[0]
 
 
-def _unsure(
-    path: Path, lines: Mapping[str, list[str]], pairs: list[tuple[str, str]], folder: str | None
-) -> tuple[str, ...]:
+def _unsure(path: Path, lines: Mapping[str, list[str]], pairs: list[tuple[str, str]]) -> tuple[str, ...]:
     rivals = [pair for pair in pairs if pair[0][-1] in "02"]
-    if len(rivals) < 2 or "P1_roi" in lines or folder in _FOLDERS:
+    if len(rivals) < 2 or "P1_roi" in lines:
         return ()
     one, other = (_baseline(path, lines, pair) for pair in rivals[:2])
     return (

@@ -1,6 +1,8 @@
-"""Read YAML, JSON and OpenCV's XML as names and values."""
+"""Read YAML, JSON, TOML and OpenCV's XML as names and values."""
 
 import json
+import re
+import tomllib
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -37,6 +39,14 @@ def json_values(path: Path, text: str) -> dict[str, Any]:
         raise CalibrationError(f"{path}: no valid JSON ({_line(error)})") from error
 
 
+def toml_values(path: Path, text: str) -> dict[str, Any]:
+    """Read a TOML text; raises `CalibrationError` if it is not valid."""
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # of a number with too many digits, a plain ValueError
+        raise CalibrationError(f"{path}: no valid TOML ({_line(error)})") from error
+
+
 def xml_values(path: Path, text: str) -> dict[str, Any]:
     """Read an OpenCV XML text, each value as a list of words; raises `CalibrationError` if it is not valid."""
     try:
@@ -48,13 +58,15 @@ def xml_values(path: Path, text: str) -> dict[str, Any]:
 
 def _plain_yaml(text: str) -> str:
     """Drop the directive that OpenCV writes and YAML does not know, and its tag."""
-    first, _, rest = text.lstrip().partition("\n")
-    return (rest if first.startswith("%YAML") else text).replace("!!opencv-matrix", "")
+    return re.sub(r"^%YAML.*", "", text, flags=re.MULTILINE).replace("!!opencv-matrix", "")
 
 
 def _named(path: Path, found: object) -> dict[str, Any]:
     if not isinstance(found, dict):
-        raise CalibrationError(f"{path}: no names and values; expected a calibration")
+        raise CalibrationError(
+            f"{path}: no names and values, as YAML and JSON have them; of calibrations in two files, ROS's and "
+            "OpenCV's are read"
+        )
     return {str(name): value for name, value in found.items()}
 
 

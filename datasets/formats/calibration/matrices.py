@@ -6,27 +6,36 @@ OpenCV's ``FileStorage`` (YAML, XML, JSON) holds them, and JSON or YAML that peo
     {"K": [[600, 0, 320], [0, 600, 240], [0, 0, 1]], "baseline": 0.12, "unit": "m"}
     {"fx": 600, "fy": 600, "cx": 320, "cy": 240, "baseline": 120, "unit": "mm"}
     {"left": {"fx": ...}, "right": {"fx": ...}, "baseline": 120, "unit": "mm"}
+    {"intrinsic": {"fx": 2262.5, "fy": 2265.3, "u0": 1097, "v0": 513}, "extrinsic": {"baseline": 0.21}}   Cityscapes
 
-Upper and lower case are the same. ``imageSize`` is columns and rows, as ``cv::Size`` is. The unit of OpenCV's files is
-that of the calibration board's squares, which they do not tell.
+Upper and lower case are the same. ``imageSize`` and ``resolution`` are columns and rows, as ``cv::Size`` is;
+``image_shape`` is rows and columns, as NumPy's is. The unit of OpenCV's files is that of the calibration board's
+squares, which they do not tell. With two cameras ``doffs`` repeats what they say; with one, it moves the right one's
+``cx``.
 
 ``Q`` reprojects ``[x y d 1]``: up to a factor it holds 1, ``cx``, ``cy``, ``f``, ``1/baseline`` and ``doffs/baseline``.
 Source: OpenCV's ``stereoRectify`` and ``reprojectImageTo3D``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from semidense.datasets.errors import CalibrationError
-from semidense.datasets.formats.calibration.cameras import MILLIMETRES, VERTICAL, Cameras
+from semidense.datasets.formats.calibration.cameras import VERTICAL, Cameras, unknown_format
 from semidense.datasets.formats.calibration.text import Matrix, matrix
 
 _CAMERA = ("k", "camera_matrix", "cameramatrix", "intrinsics")
 _SIDES = (("left", "right"), ("cam0", "cam1"), ("left_camera", "right_camera"))
-_WIDTH, _HEIGHT, _BOTH = ("image_width", "width"), ("image_height", "height"), ("imagesize", "image_size")
+_PARTS = ("intrinsic", "extrinsic")
+_CENTRE = {"cx": ("cx", "ppx", "u0"), "cy": ("cy", "ppy", "v0")}
+"""Names of the principal point's column and row: also those of RealSense and of Cityscapes."""
+_WIDTH, _HEIGHT = ("image_width", "width", "w"), ("image_height", "height", "h")
+_SIZES, _SHAPES = ("imagesize", "image_size", "resolution"), ("image_shape", "imageshape")
+_UNRECTIFIED = ("m1", "k1", "cameramatrix1", "camera_matrix_1", "camera_matrix_left", "left_camera_matrix")
+"""Names of the left camera matrix in files of ``cv2.stereoCalibrate``."""
 _OF_Q = ((0, 0), (1, 1), (0, 3), (1, 3), (2, 3), (3, 2), (3, 3))
 """Entries of Q that may differ from 0."""
 
@@ -37,26 +46,50 @@ def matrices_cameras(path: Path, found: Mapping[str, Any]) -> Cameras:
     Raises:
         CalibrationError: If a matrix is not valid, or what depth needs is not there.
     """
+    values = _flat(found)
+    views = _views(values)
+    left, right = _projections(path, values, views)
+    unit = values.get("unit", values.get("units"))
+    size = next((size for each in (values, *views) if (size := _size(path, each))), None)
+    doffs = _number(path, values, "doffs") if views and "doffs" in values else None
+    return Cameras(path, left, right, None if unit is None else _word(unit), size, doffs=doffs)
+
+
+def _word(value: object) -> str:
+    """Return a text, also where XML gives it as a list of words."""
+    return " ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def _flat(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values with names in lower case; what Cityscapes keeps in two parts is put together."""
     values = _lower(found)
-    left, right = _projections(path, values)
-    unit = str(values.get("unit", values.get("units", "")))
-    return Cameras(path, left, right, unit if unit in MILLIMETRES else None, _size(path, values))
+    parts = [_lower(values[name]) for name in _PARTS if isinstance(values.get(name), dict)]
+    return {name: value for each in (values, *parts) for name, value in each.items()}
 
 
 def _lower(found: Mapping[str, Any]) -> dict[str, Any]:
     return {str(name).lower(): value for name, value in found.items()}
 
 
-def _projections(path: Path, values: Mapping[str, Any]) -> tuple[Matrix, Matrix]:
+def _views(values: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the values of the left and the right camera where each has its own, else nothing."""
+    sides = next((pair for pair in _SIDES if all(isinstance(values.get(name), dict) for name in pair)), ())
+    return [_lower(values[name]) for name in sides]
+
+
+def _projections(path: Path, values: Mapping[str, Any], views: Sequence[Mapping[str, Any]]) -> tuple[Matrix, Matrix]:
     if {"p1", "p2"} <= values.keys():
         return _matrix(path, values, "p1", (3, 4)), _matrix(path, values, "p2", (3, 4))
     if "q" in values:
         return _from_q(path, _matrix(path, values, "q", (4, 4)))
     if "baseline" in values:
-        return _from_baseline(path, values)
-    raise CalibrationError(
-        f"{path}: neither P1 and P2 nor Q, nor a camera matrix and a baseline; save what cv2.stereoRectify gives"
-    )
+        return _from_baseline(path, values, views)
+    if any(name in values for name in _UNRECTIFIED):
+        raise CalibrationError(
+            f"{path}: neither P1 and P2 nor Q: it is of cameras that are not rectified; rectify the pair with it first "
+            "(pipeline rectify LEFT RIGHT --calib FILE)"
+        )
+    raise unknown_format(path, ": neither P1 and P2 nor Q, nor a camera matrix and a baseline")
 
 
 def _from_q(path: Path, given: Matrix) -> tuple[Matrix, Matrix]:
@@ -73,11 +106,9 @@ def _from_q(path: Path, given: Matrix) -> tuple[Matrix, Matrix]:
     return _moved(shared, shared, baseline, q[3, 3] * baseline)
 
 
-def _from_baseline(path: Path, values: Mapping[str, Any]) -> tuple[Matrix, Matrix]:
-    sides = next((pair for pair in _SIDES if all(isinstance(values.get(name), dict) for name in pair)), None)
-    views = [_lower(values[name]) for name in sides] if sides else [values, values]
-    left, right = (_intrinsics(path, view) for view in views)
-    doffs = _number(path, values, "doffs") if "doffs" in values else 0.0
+def _from_baseline(path: Path, values: Mapping[str, Any], views: Sequence[Mapping[str, Any]]) -> tuple[Matrix, Matrix]:
+    left, right = (_intrinsics(path, view) for view in (views or (values, values)))
+    doffs = 0.0 if views or "doffs" not in values else _number(path, values, "doffs")
     return _moved(left, right, _number(path, values, "baseline"), doffs)
 
 
@@ -92,9 +123,14 @@ def _intrinsics(path: Path, values: Mapping[str, Any]) -> Matrix:
     name = next((name for name in _CAMERA if name in values and "fx" not in values), None)
     if name:
         return _matrix(path, values, name, (3, 3))
-    fx, cx, cy = (_number(path, values, key) for key in ("fx", "cx", "cy"))
+    fx, cx, cy = (_number(path, values, key) for key in ("fx", _called(values, "cx"), _called(values, "cy")))
     fy = _number(path, values, "fy") if "fy" in values else fx
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+
+
+def _called(values: Mapping[str, Any], name: str) -> str:
+    """Return under which of its names a coordinate of the principal point is there."""
+    return next((each for each in _CENTRE[name] if each in values), name)
 
 
 def _matrix(path: Path, values: Mapping[str, Any], name: str, shape: tuple[int, int]) -> Matrix:
@@ -113,9 +149,15 @@ def _number(path: Path, values: Mapping[str, Any], name: str) -> float:
 
 
 def _size(path: Path, values: Mapping[str, Any]) -> tuple[int, int] | None:
-    both = next((_numbers(values[name]) for name in _BOTH if name in values), None)
-    columns, rows = (next((values[name] for name in names if name in values), None) for names in (_WIDTH, _HEIGHT))
-    if both is None and (columns is None or rows is None):
+    """Return rows and columns under one of their names; None if there are none."""
+    width, height, size, shape = (
+        next((values[name] for name in names if name in values), None) for names in (_WIDTH, _HEIGHT, _SIZES, _SHAPES)
+    )
+    if isinstance(size, dict) and "data" not in size:
+        return _size(path, _lower(size))
+    if size is None and width is not None and height is not None:
+        size = [width, height]
+    if size is None and shape is None:
         return None
-    found = matrix(path, "the image's size", [columns, rows] if both is None else both, (1, 2))[0]
-    return int(found[1]), int(found[0])
+    first, second = matrix(path, "the image's size", _numbers(shape if size is None else size), (1, 2))[0]
+    return (int(first), int(second)) if size is None else (int(second), int(first))

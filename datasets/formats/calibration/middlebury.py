@@ -11,7 +11,8 @@
     ndisp=70                                                disparities to search: 0 to ndisp - 1
 
 Spaces around names, signs and values are allowed, and comments after a ``#``. Other names (``isint``, ``vmin``,
-``dymax``, ...) are passed over. Without ``cam1`` the right camera is ``cam0`` moved by ``doffs``.
+``dymax``, ...) are passed over. Without ``cam1`` the right camera is ``cam0`` moved by ``doffs``. A calibration that
+people write themselves may lack ``doffs`` if it has ``cam1``, and the size and ``ndisp``.
 Source: https://vision.middlebury.edu/stereo/data/scenes2014/
 """
 
@@ -65,6 +66,7 @@ def read_calib(path: str | os.PathLike[str]) -> CalibrationFile:
     path = Path(path)
     entries = named_lines(path, read_text(path))
     known = calibrated(middlebury_cameras(entries))
+    entries.get("doffs", number, "a number")
     return CalibrationFile(known.calibration, _size(entries), _ndisp(entries), known.warnings)
 
 
@@ -72,17 +74,22 @@ def middlebury_cameras(entries: NamedLines) -> Cameras:
     """Return what the lines of a ``calib.txt`` say; raises what `read_calib` raises."""
     left = entries.get("cam0", camera, CAMERA)
     baseline = entries.get("baseline", positive, "a number above 0")
-    doffs = entries.get("doffs", number, "a number")
-    right = entries.get("cam1", camera, CAMERA) if "cam1" in entries.lines else left + _moved(doffs)
+    doffs = None if _lacks(entries, "doffs") and "cam1" in entries.lines else entries.get("doffs", number, "a number")
+    right = left + _moved(doffs or 0) if _lacks(entries, "cam1") else entries.get("cam1", camera, CAMERA)
     return Cameras(
         entries.path,
         np.column_stack([left, np.zeros(3)]),
         np.column_stack([right, [-left[0, 0] * baseline, 0, 0]]),
         "mm",
-        _size(entries),
-        _ndisp(entries),
+        None if _lacks(entries, "width", "height") else _size(entries),
+        None if _lacks(entries, "ndisp") else _ndisp(entries),
         doffs,
     )
+
+
+def _lacks(entries: NamedLines, *names: str) -> bool:
+    """Tell whether a file has no line of these names."""
+    return not set(names) & entries.lines.keys()
 
 
 def _moved(doffs: float) -> Matrix:

@@ -1,29 +1,43 @@
-"""Read a pair of ROS ``CameraInfo`` files, left and right, in metres.
+"""Turn the two ``CameraInfo`` of a ROS pair, left and right, into cameras; in metres.
 
-A file is what ``camera_calibration`` writes, or a message as ``rostopic echo`` or ``ros2 topic echo`` prints it. A
-message's ``roi`` and ``binning`` say which part of the full image was sent, and how coarsely. The projection matrix is
-that of the full image: the offset is taken off ``cx`` and ``cy``, then the first two rows are divided by the binning.
+Their values come from files that ``camera_calibration`` writes, or from messages as ``rostopic echo`` or ``ros2 topic
+echo`` prints them. A message's ``roi`` and ``binning`` say which part of the full image was sent, and how coarsely. The
+projection matrix is that of the full image: the offset is taken off ``cx`` and ``cy``, then the first two rows are
+divided by the binning.
 Sources: ROS message ``sensor_msgs/CameraInfo``; ``image_geometry``'s ``PinholeCameraModel``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from semidense.datasets.errors import CalibrationError
-from semidense.datasets.formats.calibration.cameras import Cameras
-from semidense.datasets.formats.calibration.markup import yaml_values
-from semidense.datasets.formats.calibration.text import Matrix, matrix, read_text
+from semidense.datasets.formats.calibration.cameras import Cameras, unknown_format
+from semidense.datasets.formats.calibration.text import Matrix, matrix
+
+_PROJECTION = ("projection_matrix", "P", "p")
 
 
-def ros_cameras(left: Path, right: Path) -> Cameras:
-    """Read both files.
+def has_projection(info: Mapping[str, Any]) -> bool:
+    """Tell whether values are those of a ``CameraInfo``."""
+    return any(name in info for name in _PROJECTION)
+
+
+def ros_cameras(files: Sequence[Path], infos: Sequence[Mapping[str, Any]]) -> Cameras:
+    """Return what two ``CameraInfo`` say.
+
+    Args:
+        files: One file of both, or a left and a right one.
+        infos: Their values, left and right.
 
     Raises:
-        MissingFileError: If one cannot be read.
-        CalibrationError: If one is no ``CameraInfo``, or the two are of images of different size.
+        CalibrationError: If they are not two, one is no ``CameraInfo``, or they are of images of different size.
     """
-    infos = [yaml_values(path, read_text(path)) for path in (left, right)]
+    left, right = files[0], files[-1]
+    if len(infos) != 2:
+        raise unknown_format(
+            right, f"; {len(infos)} camera{'s' * (len(infos) > 1)} of ROS: give the left and the right one"
+        )
     size, other = _size(left, infos[0]), _size(right, infos[1])
     if other != size:
         raise CalibrationError(f"{right}: image of {other}, but {left} is of {size} (rows, columns)")
@@ -31,7 +45,7 @@ def ros_cameras(left: Path, right: Path) -> Cameras:
 
 
 def _projection(path: Path, info: Mapping[str, Any]) -> Matrix:
-    found = info.get("projection_matrix", info.get("P", info.get("p")))
+    found = next((info[name] for name in _PROJECTION if name in info), None)
     full = matrix(path, "projection_matrix (or P)", found.get("data") if isinstance(found, dict) else found, (3, 4))
     for row, axis in enumerate("xy"):
         full[row, 2] -= _roi(path, info, f"{axis}_offset")

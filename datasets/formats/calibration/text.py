@@ -1,6 +1,5 @@
 """Read a calibration file as text, and the names, numbers and matrices in it."""
 
-import codecs
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -12,26 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.datasets.errors import CalibrationError
-from semidense.datasets.formats.files import read_bytes
+from semidense.datasets.formats import files
 
 Matrix: TypeAlias = NDArray[np.float64]
 _LARGEST_FILE = 1 << 18
-_UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _Value = TypeVar("_Value")
 
 
 def read_text(path: Path) -> str:
-    """Read a small text file: UTF-8, or UTF-16 as Windows' shell writes it; a byte order mark is dropped.
+    r"""Read a small text file, with ``\n`` at every line's end.
 
     Raises:
         MissingFileError: If it cannot be read.
         CalibrationError: If it is larger than 262,144 bytes or no text.
     """
-    content = read_bytes(path, _LARGEST_FILE, CalibrationError, "calibration")
-    try:
-        return content.decode("utf-16" if content.startswith(_UTF16) else "utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise CalibrationError(f"{path}: not plain text; the file is no calibration") from error
+    text = files.read_text(path, _LARGEST_FILE, CalibrationError, "calibration")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def without_comments(text: str) -> str:
+    """Return a text without what follows a ``#`` in a line."""
+    return re.sub(r"#.*", "", text)
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,8 @@ def named_lines(path: Path, text: str) -> NamedLines:
         CalibrationError: If a line is anything else, or a name is given twice; the line is named.
     """
     entries: dict[str, tuple[int, str]] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        content = line.partition("#")[0].strip()
+    for number, line in enumerate(without_comments(text).splitlines(), start=1):
+        content = line.strip()
         name, sign, value = (part.strip() for part in content.partition("="))
         if not content:
             continue
@@ -127,10 +127,16 @@ def matrix(path: Path, name: str, data: object, shape: tuple[int, int]) -> Matri
     Raises:
         CalibrationError: If they are too few or too many, or not finite numbers.
     """
-    try:
-        values = np.array(data, np.float64)
-    except (TypeError, ValueError):
-        values = np.empty(0)
+    values = _floats(data)
     if values.size != math.prod(shape) or not np.isfinite(values).all():
         raise CalibrationError(f"{path}: {name} is no matrix of {shape[0]} x {shape[1]} numbers")
     return values.reshape(shape)
+
+
+def _floats(data: object) -> Matrix:
+    """Return numbers of any nesting, flat; nothing if one of them is no number, as ``true`` is none."""
+    try:
+        cells = np.array(data, object).ravel()
+        return np.empty(0) if any(isinstance(cell, bool) for cell in cells) else cells.astype(np.float64)
+    except (TypeError, ValueError):
+        return np.empty(0)

@@ -8,17 +8,20 @@ import typer
 from semidense.pipeline.cli.options import (
     CacheOption,
     ConfigOption,
+    DryRunOption,
     JsonOption,
     ModeOption,
     PresetOption,
+    QuietOption,
     SceneOption,
     SchedulerOption,
     SetOption,
+    VerboseOption,
     WorkersOption,
     chosen,
+    chosen_preset,
     config_file,
 )
-from semidense.pipeline.plan.presets import DEFAULT
 
 
 def register(app: typer.Typer) -> None:
@@ -59,16 +62,19 @@ def compare(
         float, typer.Option("--threshold", help="Error in px above which tables and figures call a pixel wrong.")
     ] = 1.0,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     output: Annotated[
         Path,
         typer.Option("--output", "-o", help="Write comparison.csv, comparison.json and the figures to this folder."),
     ] = Path("comparison"),
+    dry_run: DryRunOption = False,
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
     cache: CacheOption = None,
+    verbose: VerboseOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compare other matchers with the two networks.
@@ -77,9 +83,10 @@ def compare(
     """
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
-    from semidense.pipeline.comparison import experiments as comparison
     from semidense.pipeline.comparison import files as comparison_report
     from semidense.pipeline.comparison import tables
+    from semidense.pipeline.comparison.experiments import carry_out_comparison
+    from semidense.pipeline.comparison.prepared import EXPERIMENTS, prepare
     from semidense.pipeline.execution.progress import ProgressWatch
     from semidense.pipeline.plan.errors import UsageError
     from semidense.stages.metrics.errors import THRESHOLDS
@@ -87,25 +94,21 @@ def compare(
     if threshold not in THRESHOLDS:
         offered = ", ".join(f"{each:g}" for each in THRESHOLDS)
         raise UsageError(f"--threshold {threshold:g}: figures are worked out for {offered} px")
-    task = api.Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, preset)
-    experiments = experiment or comparison.EXPERIMENTS
-    with ProgressWatch(console.announce) as watch:
-        found = comparison.compare(
-            task,
-            experiments,
-            train_on,
-            protocol or (),
-            without=without or (),
-            watch=watch,
-            scheduler=scheduler,
-            workers=workers,
-        )
+    named = chosen_preset(preset, config)
+    task = api.Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, named)
+    prepared = prepare(task, experiment or EXPERIMENTS, train_on, protocol or (), without=without or ())
+    store = api.open_store(cache)
+    if dry_run:
+        return console.show_plan(prepared.plan(), store, as_json)
+    with ProgressWatch(console.announce, verbose - quiet) as watch:
+        watch.expect(prepared.plan(), store)
+        found = carry_out_comparison(prepared, watch=watch, scheduler=scheduler, workers=workers)
     files = comparison_report.write_comparison(found, output, threshold)
     if as_json:
-        console.print_json(comparison_report.as_json(found, files))
-        return
+        return console.print_json(comparison_report.as_json(found, files))
     tables.print_comparison(found, found.result.mask_kinds().values(), threshold)
     console.print_notes(found.notes)
     for file in files:
         typer.echo(f"wrote {file}")
     typer.echo(console.reuse_line(found.result.made.values()))
+    return None

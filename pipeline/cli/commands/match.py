@@ -1,4 +1,4 @@
-"""The commands ``match`` and ``rectify``, for a user's own pairs. Nothing heavy is imported before one runs."""
+"""The command ``match``, for a user's own pairs. Nothing heavy is imported before it runs."""
 
 import sys
 from collections.abc import Sequence
@@ -14,10 +14,13 @@ from semidense.pipeline.cli.options import (
     JsonOption,
     ModeOption,
     PresetOption,
+    QuietOption,
     SchedulerOption,
     SetOption,
+    VerboseOption,
     WorkersOption,
     chosen,
+    chosen_preset,
     config_file,
 )
 from semidense.pipeline.plan.presets import OWN_PAIRS
@@ -31,9 +34,8 @@ _EXAMPLES = {"density": "80% or 0.8", "max-error": "2% or 0.02"}
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
+    """Add the command to the command line."""
     app.command()(match)
-    app.command()(rectify)
 
 
 def match(
@@ -111,13 +113,15 @@ def match(
         list[str] | None, typer.Option("--scene", help="Match this pair only; repeat the option for several.")
     ] = None,
     settings: SetOption = None,
-    preset: PresetOption = OWN_PAIRS,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     dry_run: DryRunOption = False,
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
     cache: CacheOption = None,
+    verbose: VerboseOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Match your own rectified pair, or many.
@@ -130,8 +134,9 @@ def match(
 
     options = PairOptions(tuple(calib or ()), unit, min_disp, max_disp, split)
     sides = [left] if right is None else [left, right]
+    named = chosen_preset(preset, config, OWN_PAIRS)
     task = Task(
-        pair_spec(sides, options), tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, preset
+        pair_spec(sides, options), tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, named
     )
     wishes = Wishes(
         R=threshold,
@@ -147,7 +152,7 @@ def match(
     if dry_run:
         _plan(task, wishes, as_json)
     else:
-        _carry_out(task, wishes, output, kinds, {"scheduler": scheduler, "workers": workers}, as_json)
+        _carry_out(task, wishes, output, kinds, {"scheduler": scheduler, "workers": workers}, verbose - quiet, as_json)
 
 
 def _plan(task: "Task", wishes: "Wishes", as_json: bool) -> None:
@@ -155,18 +160,13 @@ def _plan(task: "Task", wishes: "Wishes", as_json: bool) -> None:
 
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
-    from semidense.pipeline.results.estimate import estimate
 
     plan = api.status(replace(task, settings=(*task.settings, *wishes.settings)), wishes.product)
-    time = estimate(plan, api.open_store(task.cache))
-    if as_json:
-        console.print_json({"steps": console.step_rows(plan, {}), "estimate_seconds": time.seconds})
-    else:
-        console.print_plan(plan, time)
+    console.show_plan(plan, api.open_store(task.cache), as_json)
 
 
 def _carry_out(
-    task: "Task", wishes: "Wishes", output: Path, kinds: Sequence[str], how: dict[str, Any], as_json: bool
+    task: "Task", wishes: "Wishes", output: Path, kinds: Sequence[str], how: dict[str, Any], detail: int, as_json: bool
 ) -> None:
     from dataclasses import replace
 
@@ -177,7 +177,7 @@ def _carry_out(
 
     task = replace(task, dataset=task.open())
     require_place(task.open().scenes, output, kinds)
-    with ProgressWatch(console.announce) as watch:
+    with ProgressWatch(console.announce, detail) as watch:
         found = match_all(task, wishes, watch=watch, **how)
     summaries = save_all(found, output, kinds)
     for each in found:
@@ -259,41 +259,3 @@ def _formats(text: str) -> list[str]:
         if kind not in FORMATS:
             raise UsageError(f"no format {kind!r}; {nearest(kind, FORMATS)}")
     return chosen
-
-
-def rectify(
-    left: Annotated[Path, typer.Argument(help="The left view, as the camera took it.")],
-    right: Annotated[Path, typer.Argument(help="The right view.")],
-    calib: Annotated[
-        list[Path],
-        typer.Option(
-            help="OpenCV's stereo calibration with M1 D1 M2 D2 and R T, or R1 R2 P1 P2; repeat the option if it is in "
-            "two files."
-        ),
-    ],
-    output: Annotated[
-        Path, typer.Option("--output", "-o", help="Write both views and their calibration to this folder.")
-    ] = Path("rectified"),
-    unit: Annotated[
-        str | None, typer.Option(help="Unit of the calibration's lengths: mm, cm or m; match needs it for depth.")
-    ] = None,
-    alpha: Annotated[
-        float,
-        typer.Option(min=0, max=1, help="0: crop to what both lenses saw; 1: keep every pixel, with black edges."),
-    ] = 0.0,
-    as_json: JsonOption = False,
-) -> None:
-    """Rectify a pair, so that match can take it.
-
-    Needs OpenCV and a stereo calibration that was made with OpenCV.
-    """
-    from semidense.pipeline.cli.console import print_json
-    from semidense.pipeline.pairs.rectification import rectify_files
-
-    files = rectify_files(left, right, calib, output, unit, alpha)
-    if as_json:
-        print_json({"files": [str(file) for file in files]})
-        return
-    for file in files:
-        typer.echo(f"wrote {file}")
-    typer.echo(f"next: pipeline match {files[0]} {files[1]} --calib {files[2]} -o DIR")

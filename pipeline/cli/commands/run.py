@@ -16,21 +16,21 @@ from semidense.pipeline.cli.options import (
     OutputOption,
     PresetOption,
     ProductArgument,
+    QuietOption,
     SceneOption,
     SchedulerOption,
     SetOption,
     TrainOption,
     UptoOption,
+    VerboseOption,
     WorkersOption,
     chosen,
+    chosen_preset,
     config_file,
 )
-from semidense.pipeline.plan.presets import DEFAULT
 
 if TYPE_CHECKING:
-    from semidense.cache import Store
     from semidense.pipeline.api import Task
-    from semidense.pipeline.plan.plan import Plan
     from semidense.pipeline.results.result import Result
 
 
@@ -45,7 +45,7 @@ def run(
     upto: UptoOption = "metrics",
     scene: SceneOption = None,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
@@ -55,6 +55,8 @@ def run(
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
     cache: CacheOption = None,
+    verbose: VerboseOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Make the products of a dataset; what is cached is reused."""
@@ -64,8 +66,8 @@ def run(
 
     task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     if dry_run:
-        return _print_plan(api.status(task, upto, forced=force or ()), api.open_store(cache), as_json)
-    with ProgressWatch(console.announce) as watch:
+        return console.show_plan(api.status(task, upto, forced=force or ()), api.open_store(cache), as_json)
+    with ProgressWatch(console.announce, verbose - quiet) as watch:
         result = api.run(task, upto, forced=force or (), watch=watch, scheduler=scheduler, workers=workers)
     files = _export(result, output)
     if as_json:
@@ -88,16 +90,19 @@ def sweep(
             "--set", help="Try several values of a setting: section.field=value1,value2; all combinations are made."
         ),
     ] = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Write sweep.csv, sweep.png and sweep.json to this folder.")
     ] = Path("sweep"),
+    dry_run: DryRunOption = False,
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
     cache: CacheOption = None,
+    verbose: VerboseOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compare error and density at many thresholds R.
@@ -110,7 +115,10 @@ def sweep(
     from semidense.pipeline.files.run_files import write_sweep
 
     task = _task(dataset, scene, chosen(None, mode), config, train, cache, preset)
-    with ProgressWatch(console.announce) as watch:
+    if dry_run:
+        request = api.sweep_request(task, thresholds, settings or ())
+        return console.show_plan(api.planned(task, request), api.open_store(cache), as_json)
+    with ProgressWatch(console.announce, verbose - quiet) as watch:
         result = api.sweep(task, thresholds, settings or (), watch=watch, scheduler=scheduler, workers=workers)
     files = write_sweep(result.metrics, output)
     if as_json:
@@ -120,6 +128,7 @@ def sweep(
         console.print_sweep(result.metrics, result.mask_kinds())
         _say_files(files)
         print(console.reuse_line(result.made.values()))
+    return None
 
 
 def status(
@@ -127,7 +136,7 @@ def status(
     upto: UptoOption = "metrics",
     scene: SceneOption = None,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
@@ -136,9 +145,10 @@ def status(
 ) -> None:
     """Print which products are cached, and why the others must be made."""
     from semidense.pipeline import api
+    from semidense.pipeline.cli import console
 
     plan = api.status(_task(dataset, scene, chosen(settings, mode), config, train, cache, preset), upto)
-    _print_plan(plan, api.open_store(cache), as_json)
+    console.show_plan(plan, api.open_store(cache), as_json)
 
 
 def explain(
@@ -146,7 +156,7 @@ def explain(
     dataset: DatasetArgument = "motorcycle",
     scene: SceneOption = None,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
@@ -168,7 +178,7 @@ def explain(
     task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     planned = api.explain(task, product)
     found = explanation(planned, api.open_store(cache))
-    found |= {"preset": {"name": preset, "settings": list(preset_settings(preset))}}
+    found |= {"preset": {"name": task.preset, "settings": list(preset_settings(task.preset))}}
     if graph:
         draw_provenance(planned, api.open_store(cache), graph, task)
     if as_json:
@@ -189,7 +199,7 @@ def inspect(
         int | None, typer.Option("--disparity", help="Draw the slice of costs at this disparity, px.")
     ] = None,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: TrainOption = False,
@@ -218,23 +228,12 @@ def _task(
     config: Path | None,
     train: bool,
     cache: Path | None,
-    preset: str,
+    preset: str | None,
 ) -> "Task":
     from semidense.pipeline.api import Task
 
-    return Task(dataset, tuple(scenes or ()), settings, config_file(config), train, cache, preset)
-
-
-def _print_plan(plan: "Plan", store: "Store", as_json: bool) -> None:
-    from semidense.pipeline.cli import console
-    from semidense.pipeline.results.estimate import estimate
-
-    time = estimate(plan, store)
-    if as_json:
-        steps = console.step_rows(plan, {})
-        console.print_json({"steps": steps, "metrics": [], "estimate_seconds": time.seconds})
-    else:
-        console.print_plan(plan, time)
+    chosen = chosen_preset(preset, config)
+    return Task(dataset, tuple(scenes or ()), settings, config_file(config), train, cache, chosen)
 
 
 def _print_result(result: "Result", files: list[Path]) -> None:

@@ -17,9 +17,9 @@ from semidense.pipeline.cli.options import (
     SceneOption,
     SetOption,
     chosen,
+    chosen_preset,
     config_file,
 )
-from semidense.pipeline.plan.presets import DEFAULT
 
 
 def register(app: typer.Typer) -> None:
@@ -33,11 +33,12 @@ def report(
     output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path("report.html"),
     scene: SceneOption = None,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     train: Annotated[bool, typer.Option("--train", help="Report on a run that trained the networks.")] = False,
     cache: CacheOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Write all cached results of a dataset into one HTML file.
 
@@ -46,9 +47,14 @@ def report(
     from semidense.pipeline.api import Task
     from semidense.pipeline.pages.report import report as write
 
-    path = write(
-        Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), train, cache, preset), output
-    )
+    named = chosen_preset(preset, config)
+    task = Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), train, cache, named)
+    path = write(task, output)
+    if as_json:
+        from semidense.pipeline.cli.console import print_json
+
+        print_json({"files": [str(path)], "bytes": path.stat().st_size})
+        return
     typer.echo(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
 
 

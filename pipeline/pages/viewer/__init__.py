@@ -24,7 +24,9 @@ def view(cache: Path | str | None = None, *, port: int = 5006, show: bool = True
         raise UsageError(INSTALL)
     store = open_store(cache)
     if not store.root.is_dir():
-        raise UsageError(f"{store.root}: no cache is there; make one with `pipeline run`, or name another by --cache")
+        raise UsageError(
+            f"{store.root}: no cache is there; make one with `pipeline match` or `run`, or name another: --cache"
+        )
     from semidense.pipeline.pages.viewer.server import serve
 
     serve(store, port, show)

@@ -113,7 +113,10 @@ class Session:
         self.maps = self._read(self.chosen)
         if self.maps is None or self.chosen is None:
             if not self.panels.problem.text:
-                self._explain(f"nothing to look at is cached in {self.store.root}: make something with `pipeline run`")
+                self._explain(
+                    f"nothing to look at is cached in {self.store.root}: make something with `pipeline match` or "
+                    "`pipeline run`"
+                )
             return
         self._show_maps(self.maps)
         self.show_figures()

@@ -10,7 +10,7 @@ from PIL import Image
 
 from semidense.datasets import MissingFileError, image_size, open_dataset, read_calib, read_image, read_pfm
 from semidense.datasets.formats.calibration.reading import read_cameras
-from semidense.datasets.formats.files import open_file, read_bytes
+from semidense.datasets.formats.files import open_file, read_bytes, user_path
 from semidense.datasets.pairs.lists import read_list
 
 
@@ -41,3 +41,12 @@ def test_a_file_above_the_limit_is_of_the_kind_that_the_caller_names(tmp_path: P
     assert read_bytes(tmp_path / "a", 5, ValueError, "note") == b"12345"  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="more than 4 bytes; the file is no note"):
         read_bytes(tmp_path / "a", 4, ValueError, "note")  # type: ignore[arg-type]
+
+
+def test_a_tilde_is_a_home_folder_unless_a_file_is_called_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", "/home/me")
+    assert user_path("~/left.png") == Path("/home/me/left.png")
+    assert user_path("~nobody-of-this-name/left.png") == Path("~nobody-of-this-name/left.png")
+    Path("~left.png").touch()
+    assert user_path("./~left.png") == Path("~left.png")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, TiffImagePlugin
 from PIL.ImageFile import ImageFile
 
 from semidense.datasets.errors import ImageError, MissingFileError
@@ -56,6 +56,7 @@ def turned(form: str, orientation: int, image: Image.Image | None = None) -> byt
         pytest.param(encode(Image.fromarray(DEEP), "TIFF"), DEEP, id="16-bit gray TIFF stays 16-bit"),
         pytest.param(encode(Image.fromarray(DEEP), "TIFF", compression="tiff_lzw"), DEEP, id="compressed TIFF"),
         pytest.param(b"P5\n3 2\n65535\n" + DEEP.astype(">u2").tobytes(), DEEP, id="16-bit PGM stays 16-bit"),
+        pytest.param(b"P2\n3 2\n65535\n" + b" ".join(b"%d" % v for v in DEEP.ravel()), DEEP, id="16-bit PGM as text"),
         pytest.param(b"P6\n3 2\n255\n" + RGB.tobytes(), RGB, id="PPM"),
         pytest.param(encode(Image.fromarray(RGB), "BMP"), RGB, id="BMP"),
         pytest.param(encode(palette()), np.array([[[10, 20, 30], [200, 100, 50]]]), id="palette becomes RGB"),
@@ -146,6 +147,67 @@ def test_jpeg_is_read_upright(tmp_path: Path) -> None:
     assert read_image(path).shape == image_size(path) == (3, 2)
 
 
+@pytest.mark.parametrize(
+    ("largest", "stored", "expected", "kind"),
+    [
+        pytest.param(1, [0, 1], [0, 255], np.uint8, id="1 bit"),
+        pytest.param(100, [0, 20, 100], [0, 51, 255], np.uint8, id="up to 100: 20 x 2.55"),
+        pytest.param(1023, [0, 341, 1023], [0, 21845, 65535], np.uint16, id="10 bits: a third stays a third"),
+        pytest.param(4095, [0, 1365, 4095], [0, 21845, 65535], np.uint16, id="12 bits"),
+    ],
+)
+@pytest.mark.parametrize("plain", [False, True])
+def test_a_pgm_is_scaled_by_its_own_largest_value(
+    tmp_path: Path, largest: int, stored: list[int], expected: list[int], kind: type, plain: bool
+) -> None:
+    path, width = tmp_path / "a.pgm", ">u1" if largest < 256 else ">u2"
+    pixels = " ".join(map(str, stored)).encode() if plain else np.array(stored, width).tobytes()
+    path.write_bytes(f"{'P2' if plain else 'P5'}\n{len(stored)} 1\n{largest}\n".encode() + pixels)
+    found = read_image(path)
+    assert (found.tolist(), found.dtype) == ([expected], kind)
+
+
+def pages(path: Path, *kinds: int | None, old: bool = False) -> Path:
+    """A TIFF with a page for each NewSubfileType, or old SubfileType; previews and masks are smaller."""
+    with TiffImagePlugin.AppendingTiffWriter(str(path), True) as file:
+        for kind in kinds:
+            tags = {} if kind is None else {255 if old else 254: kind}
+            full = kind in ((1, None) if old else (0, None))
+            Image.fromarray(GRAY if full else GRAY[:1, :1]).save(file, "TIFF", tiffinfo=tags)
+            file.newFrame()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("kinds", "old"),
+    [
+        pytest.param((0, 1), False, id="a preview after the picture"),
+        pytest.param((1, 0), False, id="a preview before it"),
+        pytest.param((None, 1, 1), False, id="overviews of a map"),
+        pytest.param((0, 4), False, id="a mask"),
+        pytest.param((1, 2), True, id="the old tag"),
+    ],
+)
+def test_the_picture_of_a_tiff_with_previews_is_read(tmp_path: Path, kinds: tuple[int | None, ...], old: bool) -> None:
+    path = pages(tmp_path / "a.tif", *kinds, old=old)
+    assert image_size(path) == GRAY.shape
+    np.testing.assert_array_equal(read_image(path), GRAY)
+
+
+@pytest.mark.parametrize("kinds", [(0, 0), (None, None), (2, 2)], ids=["two pictures", "nothing said", "two pages"])
+@pytest.mark.parametrize("read", [read_image, image_size])
+def test_several_pictures_in_a_tiff_are_refused_from_the_header(
+    tmp_path: Path, kinds: tuple[int | None, ...], read: Callable[[Path], object]
+) -> None:
+    with pytest.raises(ImageError, match="holds 2 images; save the one to match by itself"):
+        read(pages(tmp_path / "a.tif", *kinds))
+
+
+def test_a_palette_with_alpha_is_read_without_a_warning(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    Image.fromarray(np.dstack([GRAY] * 4)).quantize(8).save(tmp_path / "a.png")
+    assert read_image(tmp_path / "a.png").shape == (2, 3, 3)
+
+
 def animation() -> bytes:
     frames = [Image.new("L", (2, 2), value) for value in (0, 255)]
     return encode(frames[0], "TIFF", save_all=True, append_images=frames[1:])
@@ -171,8 +233,10 @@ BAD_IMAGES = [
     pytest.param(png(2, 16, 2, 1, b"\0" + bytes(12)), "16-bit colour", id="16-bit RGB would lose 8 bits"),
     pytest.param(png(6, 16, 2, 1, b"\0" + bytes(16)), "16-bit colour", id="16-bit RGBA"),
     pytest.param(png(4, 16, 2, 1, b"\0" + bytes(8)), "16-bit colour", id="16-bit gray with alpha"),
-    pytest.param(b"P6\n1 1\n65535\n" + bytes(6), "largest value 65535", id="16-bit PPM would lose 8 bits"),
-    pytest.param(b"P5\n1 1\n100\n\x07", "largest value 100", id="PGM whose values would be stretched"),
+    pytest.param(b"P6\n1 1\n65535\n" + bytes(6), "16-bit colour", id="16-bit PPM would lose 8 bits"),
+    pytest.param(b"P3\n1 1\n1023\n1 2 3\n", "16-bit colour", id="10-bit PPM in plain text"),
+    pytest.param(b"P5\n1 1\n70000\n" + bytes(4), "damaged image", id="a largest value that PGM does not have"),
+    pytest.param(encode(Image.fromarray(DEEP), "TIFF", tiffinfo={262: 0}), "0 means white", id="16-bit negative"),
     pytest.param(animation(), "holds 2 images", id="several images in one file"),
     pytest.param(png(0, 8, 9000, 9000, b"\0"), "9000 x 9000 = 81,000,000 pixels", id="above the limit"),
     pytest.param(png(0, 8, 60000, 60000, b"\0"), "pixels", id="decompression bomb"),

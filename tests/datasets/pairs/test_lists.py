@@ -30,6 +30,8 @@ def folder(tmp_path: Path) -> Path:
         ),
         pytest.param("a;1.png,right.png\n", ("a;1.png", "right.png"), id="a semicolon in a name"),
         pytest.param("a,2.png;right.png\n", ("a,2.png", "right.png"), id="a comma in a name"),
+        pytest.param("Left_Image,Right image\nleft.png,right.png\n", ("left.png", "right.png"), id="longer heads"),
+        pytest.param("left.png,right.png,,\n", ("left.png", "right.png"), id="empty fields at the end"),
         pytest.param("\ufeffleft.png;right.png\r\n", ("left.png", "right.png"), id="as a spreadsheet saves it"),
     ],
 )
@@ -37,6 +39,12 @@ def test_lists_as_spreadsheets_write_them(folder: Path, text: str, names: tuple[
     (folder / "pairs.csv").write_text(text, newline="")
     (scene,) = open_dataset(f"pair:{folder}/pairs.csv").scenes
     assert (scene.files["left"].name, scene.files["right"].name) == names
+
+
+def test_a_list_in_utf_16(folder: Path) -> None:
+    (folder / "pairs.txt").write_text("Left\tRight\nleft.png\tright.png\n", encoding="utf-16")
+    (scene,) = open_dataset(f"pair:{folder}/pairs.txt").scenes
+    assert scene.files["right"].name == "right.png"
 
 
 def test_a_list_gives_each_pair_its_calibration(folder: Path) -> None:
@@ -52,7 +60,7 @@ def test_a_list_gives_each_pair_its_calibration(folder: Path) -> None:
         pytest.param("", "names no pair", id="empty"),
         pytest.param("left.png\n", "line 1: 'left.png'", id="one field"),
         pytest.param("left.png,none.png\n", "line 1: .*none.png: no such file", id="missing file"),
-        pytest.param("\xff\xfe\0", "no plain text", id="binary"),
+        pytest.param("\xff\xfe\0", "not plain text; .* saved as UTF-8", id="binary"),
     ],
 )
 def test_a_bad_list_names_its_line(folder: Path, text: str, message: str) -> None:

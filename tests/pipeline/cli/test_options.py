@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from semidense.pipeline.cli.options import chosen, config_file
+from semidense.pipeline.cli.options import chosen, chosen_preset, config_file
 from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.errors import UsageError
 
@@ -35,7 +35,7 @@ def test_the_nearest_source_of_settings_wins(tmp_path: Path, monkeypatch: pytest
 
 def exported(tmp_path: Path, *settings: dict[str, dict[str, object]]) -> Path:
     path = tmp_path / "config.json"
-    path.write_text(json.dumps({"configuration": [{"settings": each} for each in settings]}))
+    path.write_text(json.dumps({"preset": "robust", "configuration": [{"sections": each} for each in settings]}))
     return path
 
 
@@ -61,3 +61,20 @@ def test_another_json_file_is_one_line(tmp_path: Path, text: str) -> None:
 def test_several_sets_of_settings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="2 sets of settings that differ"):
         Config.load(exported(tmp_path, {"semidense": {"R": 0.1}}, {"semidense": {"R": 0.2}}))
+
+
+def test_settings_of_a_stage_that_stands_in_for_another_are_kept(tmp_path: Path) -> None:
+    made = {"use": {"disparity": "aggregated"}, "aggregated": {"paths": 16}}
+    config = Config.load(exported(tmp_path, made))
+    assert (config.choice("use", "disparity"), config.section("aggregated").paths) == ("aggregated", 16)
+
+
+def test_the_preset_of_an_exported_run_is_the_default(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("PIPELINE_CONFIG", raising=False)
+    assert (chosen_preset(None, None), chosen_preset(None, None, "robust")) == ("paper", "robust")
+    file = exported(tmp_path, {})
+    assert (chosen_preset(None, file), chosen_preset("paper", file)) == ("robust", "paper")
+    Path("other.json").write_text("[]")
+    Path("pipeline.toml").touch()
+    assert [chosen_preset(None, each) for each in (Path("other.json"), Path("none.json"), None)] == ["paper"] * 3

@@ -143,3 +143,29 @@ def test_a_run_is_announced_before_it_begins() -> None:
     with ProgressWatch(lambda plan, _: told.append(plan)) as watch:
         watch.planned(PLAN, NO_STORE)
     assert told == [PLAN]
+
+
+@pytest.mark.parametrize(
+    ("detail", "lines"),
+    [
+        pytest.param(-1, [], id="quiet"),
+        pytest.param(0, ["time: 5 s", "made ramp of Toy in 2.0 s"], id="what takes a second"),
+        pytest.param(
+            1, ["time: 5 s", "made ramp of Toy in 2.0 s", "made sum of Toy in 0.5 s", "reused sum of Toy"], id="verbose"
+        ),
+    ],
+)
+def test_how_much_is_said(capsys: pytest.CaptureFixture[str], detail: int, lines: list[str]) -> None:
+    with ProgressWatch(lambda plan, store: sys.stderr.write("time: 5 s\n") and None, detail) as watch:
+        watch.planned(Plan((), ()), NO_STORE)
+        for tested, seconds, reused in ((TILED, 2.0, False), (TRAINED, 0.5, False), (TRAINED, 9.0, True)):
+            watch.published(Made(tested, "k", "d", seconds, reused))
+    assert capsys.readouterr().err.splitlines() == lines
+
+
+def test_runs_that_are_expected_together_are_announced_once(capsys: pytest.CaptureFixture[str]) -> None:
+    with ProgressWatch(lambda plan, store: sys.stderr.write(f"{len(plan.todo())}\n") and None) as watch:
+        watch.expect(Plan((Planned(TILED, "missing"), Planned(TRAINED, "missing")), ()), NO_STORE)
+        watch.planned(Plan((Planned(TILED, "missing"),), ()), NO_STORE)
+        watch.planned(Plan((Planned(TRAINED, "missing"),), ()), NO_STORE)
+    assert capsys.readouterr().err.splitlines() == ["2"]

@@ -1,6 +1,7 @@
 """A rectified pair whose cameras were turned on the spot is level again; matches of points judge it."""
 
 import json
+import re
 from pathlib import Path
 
 import cv2
@@ -14,6 +15,7 @@ from semidense.datasets.formats.calibration.reading import read_cameras
 from semidense.pipeline.pairs.rectification import rectify_files
 from semidense.pipeline.plan.errors import UsageError
 
+PAGE = Path(__file__).parents[3] / "docs" / "own-pictures.md"
 FOCAL, SCALE = 999.421, 2
 """Focal length of the Motorcycle pair in px, and how often its size is halved here."""
 TURNED = (np.array([0.01, -0.02, 0.015]), np.array([-0.012, 0.018, -0.01]))
@@ -79,6 +81,21 @@ def test_a_real_pair_of_turned_cameras_is_level_again(taken: Path, tmp_path: Pat
     assert len(after) > 100
     assert np.median(np.abs(after)) < 0.3
     assert np.mean(np.abs(after) < 1) > 0.9
+
+
+def test_the_pages_script_levels_two_photos_without_a_calibration(
+    taken: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Judged by matches of its own: level rows, and disparities that begin near 0."""
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    (script,) = (block for block in blocks if "stereoRectifyUncalibrated" in block)
+    monkeypatch.chdir(tmp_path)
+    for side in ("left", "right"):
+        Image.open(taken / f"{side}.png").save(f"{side}.jpg", quality=98)
+    exec(script, {})
+    rows = offsets(read_image(tmp_path / "left.png"), read_image(tmp_path / "right.png"))
+    assert np.abs(np.median(rows)) < 0.5
+    assert np.percentile(np.abs(rows), 75) < 1
 
 
 def test_what_is_written_is_read_by_match(taken: Path, tmp_path: Path) -> None:

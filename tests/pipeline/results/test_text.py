@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from semidense.pipeline.results.result import Result
-from semidense.pipeline.results.text import bytes_text, opening_text, print_table, time_text, value_text
+from semidense.pipeline.results.text import bytes_text, opening_text, print_in_parts, print_table, time_text, value_text
 
 
 @pytest.mark.parametrize(
@@ -63,3 +63,22 @@ def test_a_narrow_table_leaves_columns_out_and_cuts_no_number(width: int, left_o
     assert rows[0].split() == [name for name in NUMBERS if name not in left_out]
     assert rows[1].split() == " ".join(text for name, text in NUMBERS.items() if name not in left_out).split()
     assert ("left out at this width: " + ", ".join(left_out) in " ".join(shown.split())) == bool(left_out)
+
+
+@pytest.mark.parametrize("width", [30, 80, 240])
+def test_a_table_that_is_too_wide_is_printed_in_parts(width: int) -> None:
+    heads = [f"scene {place}" for place in range(12)]
+    table = Table("method", *heads, title="raw maps", box=None, pad_edge=False)
+    for column in table.columns[1:]:
+        column.no_wrap = True
+    for name in ("dual-cnn, shipped weights", "SGM"):
+        table.add_row(name, *(f"{place + 0.25:.2f}" for place in range(12)))
+    shown = io.StringIO()
+    print_in_parts(table, Console(file=shown, width=width))
+    lines = shown.getvalue().splitlines()
+    assert max(map(len, lines)) <= width
+    assert all(f"{place + 0.25:.2f}" in shown.getvalue() and heads[place] in shown.getvalue() for place in range(12))
+    assert "…" not in shown.getvalue()
+    parts = shown.getvalue().count("method")
+    assert parts == shown.getvalue().count("SGM")
+    assert (parts == 1) == (width == 240)

@@ -1,7 +1,9 @@
 """KITTI's published numbers, in the layouts of its benchmarks."""
 
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from semidense.datasets import CalibrationError, open_dataset
@@ -42,6 +44,32 @@ def test_the_cameras_are_those_of_the_folder(
     assert found.size == ((375, 1242) if text == RAW else None)
     assert len(found.warnings) == warned
     assert all("0.53273" in warning and "0.53715" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param(lambda text: text.replace("\n", "\r\n"), id="lines as Windows ends them"),
+        pytest.param(lambda text: text.replace("\n", "  # px\n"), id="comments"),
+        pytest.param(lambda text: text.replace("P", "  P").replace(":", " :"), id="spaces"),
+        pytest.param(lambda text: text.replace(" ", ", ").replace(":,", ":"), id="commas"),
+    ],
+)
+def test_how_lines_are_written_does_not_matter(tmp_path: Path, change: Callable[[str], str]) -> None:
+    (tmp_path / "c.txt").write_text(change(f"P2: {P[2]}\nP3: {P[3]}\n"), newline="")
+    assert read_cameras([tmp_path / "c.txt"]).calibration.baseline == pytest.approx(COLOUR, rel=1e-6)
+
+
+@pytest.mark.parametrize(("folder", "baseline"), [("image_00", GRAY), ("image_02", COLOUR)])
+def test_the_raw_data_keeps_its_images_one_folder_below(
+    tmp_path: Path, save_image: Callable[..., Path], folder: str, baseline: float
+) -> None:
+    view = save_image(tmp_path / folder / "data" / "0.png", np.zeros((375, 1242), np.uint8))
+    (tmp_path / "c.txt").write_text(RAW)
+    (scene,) = open_dataset(f"pair:{view},{view},calib={tmp_path}/c.txt").scenes
+    assert scene.calibration is not None
+    assert scene.calibration.baseline == pytest.approx(baseline, rel=1e-6)
+    assert scene.warnings == ()
 
 
 def test_two_cameras_are_enough(tmp_path: Path) -> None:

@@ -35,6 +35,25 @@ def saved(folder: Path, values: Any) -> Path:  # noqa: ANN401
         pytest.param({**SIMPLE, "doffs": 30, "width": 640, "height": 480}, 30, (480, 640), id="numbers"),
         pytest.param({"K": [[500, 0, 311], [0, 500, 250], [0, 0, 1]], "baseline": 0.12}, 0, None, id="K"),
         pytest.param({"left": LEFT, "right": {**LEFT, "cx": 341}, "baseline": 0.12}, 30, None, id="two cameras"),
+        pytest.param(
+            {"left": LEFT, "right": {**LEFT, "cx": 341}, "baseline": 0.12, "doffs": 30}, 30, None, id="doffs twice"
+        ),
+        pytest.param(
+            {"left": {**LEFT, "width": 640, "height": 480}, "right": LEFT, "baseline": 0.12},
+            0,
+            (480, 640),
+            id="a size of the left camera",
+        ),
+        pytest.param({**SIMPLE, "resolution": [640, 480]}, 0, (480, 640), id="a resolution"),
+        pytest.param({**SIMPLE, "image_shape": [480, 640]}, 0, (480, 640), id="a shape of NumPy's"),
+        pytest.param({**SIMPLE, "image_size": {"width": 640, "height": 480}}, 0, (480, 640), id="a size with names"),
+        pytest.param({"fx": 500, "ppx": 311, "ppy": 250, "baseline": 0.12}, 0, None, id="RealSense's names"),
+        pytest.param(
+            {"intrinsic": {"fx": 500, "fy": 500, "u0": 311, "v0": 250}, "extrinsic": {"baseline": 0.12, "x": 1.7}},
+            0,
+            None,
+            id="Cityscapes",
+        ),
     ],
 )
 def test_json(tmp_path: Path, values: dict[str, object], doffs: float, size: tuple[int, int] | None) -> None:
@@ -59,6 +78,26 @@ def test_yaml_of_ones_own(tmp_path: Path, text: str) -> None:
     assert known.baseline == pytest.approx(120)
 
 
+@pytest.mark.parametrize("word", ["m", "M", "meters", "Metre"])
+def test_a_unit_may_be_written_out(tmp_path: Path, word: str) -> None:
+    assert read_cameras([saved(tmp_path, {**SIMPLE, "unit": word})]).calibration.baseline == pytest.approx(120)
+
+
+def test_a_doffs_that_contradicts_two_cameras_is_told(tmp_path: Path) -> None:
+    values = {"left": LEFT, "right": {**LEFT, "cx": 341}, "baseline": 0.12, "doffs": 3, "unit": "m"}
+    found = read_cameras([saved(tmp_path, values)])
+    assert found.calibration.doffs == 3
+    assert "doffs is 3, but the right cx minus the left one is 30" in found.warnings[0]
+
+
+def test_toml_of_ones_own(tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text('fx = 500\ncx = 311\ncy = 250\nbaseline = 12\ndoffs = 30\nunit = "cm"\n')
+    assert read_cameras([tmp_path / "c.toml"]).calibration == Calibration(500, 120, 30, (311, 250))
+    (tmp_path / "c.toml").write_text("fx = 500\ncx =\n")
+    with pytest.raises(CalibrationError, match="no valid TOML"):
+        read_cameras([tmp_path / "c.toml"])
+
+
 def test_json_of_opencv(tmp_path: Path) -> None:
     storage = cv2.FileStorage(str(tmp_path / "c.json"), cv2.FILE_STORAGE_WRITE)
     storage.write("P1", np.array(P1))
@@ -74,6 +113,16 @@ def test_json_of_opencv(tmp_path: Path) -> None:
         pytest.param({"baseline": 1, "fx": 2, "unit": "m"}, "no cx; expected fx, fy, cx and cy", id="no centre"),
         pytest.param({"K": [1, 2], "baseline": 1, "unit": "m"}, "K is no matrix of 3 x 3", id="half a matrix"),
         pytest.param({**SIMPLE, "fx": "wide", "unit": "m"}, "fx is no matrix of 1 x 1", id="a word"),
+        pytest.param({**SIMPLE, "fx": True, "unit": "m"}, "fx is no matrix of 1 x 1", id="true is no number"),
+        pytest.param({**SIMPLE, "unit": "inch"}, "unit 'inch' of length is not known; give unit mm", id="inches"),
+        pytest.param(
+            {"K": [500, 0, 0, 0, 500, 0, 311, 250, 1], "baseline": 1, "unit": "m"}, "is it transposed", id="MATLAB's K"
+        ),
+        pytest.param(
+            {"P1": P1, "P2": np.array(P1).T.tolist(), "unit": "m"}, "focal lengths|transposed", id="P2 turned"
+        ),
+        pytest.param({"M1": 1, "R": 1, "T": 1}, "not rectified; rectify the pair with it first", id="unrectified"),
+        pytest.param({"R": 1}, "Known are: Middlebury", id="the list of what is read"),
         pytest.param({"R": 1}, "neither P1 and P2 nor Q, nor a camera matrix and a baseline", id="something else"),
     ],
 )

@@ -1,9 +1,11 @@
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from semidense.datasets.errors import CalibrationError, MissingFileError
 from semidense.datasets.formats.calibration.middlebury import read_calib
+from semidense.datasets.formats.calibration.reading import read_cameras
 from semidense.datasets.scene import Calibration
 
 GOOD = {
@@ -70,6 +72,31 @@ def test_names_a_missing_entry(tmp_path: Path, name: str) -> None:
     path = save(tmp_path, {key: value for key, value in GOOD.items() if key != name})
     with pytest.raises(CalibrationError, match=rf"no line {name}=\.\.\.; expected"):
         read_calib(path)
+
+
+@pytest.mark.parametrize(
+    "lacking",
+    [
+        pytest.param(["ndisp"], id="no ndisp"),
+        pytest.param(["width", "height", "ndisp"], id="no size"),
+        pytest.param(["doffs", "width", "height", "ndisp"], id="cameras and baseline alone"),
+        pytest.param(["cam1"], id="one camera and doffs"),
+    ],
+)
+def test_a_calibration_of_ones_own_may_lack_what_depth_does_not_need(tmp_path: Path, lacking: list[str]) -> None:
+    path = save(tmp_path, {key: value for key, value in GOOD.items() if key not in lacking})
+    found = read_cameras([path])
+    assert replace(found.calibration, doffs=31.086) == read_calib(save(tmp_path, GOOD)).calibration
+    assert found.calibration.doffs == pytest.approx(31.086)
+    assert (found.size, found.ndisp) == (
+        None if "width" in lacking else (500, 741),
+        None if "ndisp" in lacking else 70,
+    )
+
+
+def test_a_size_needs_both_sides(tmp_path: Path) -> None:
+    with pytest.raises(CalibrationError, match="no line height"):
+        read_cameras([save(tmp_path, {key: value for key, value in GOOD.items() if key != "height"})])
 
 
 @pytest.mark.parametrize(

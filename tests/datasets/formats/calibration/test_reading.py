@@ -134,6 +134,24 @@ def test_a_bad_file_is_one_line(tmp_path: Path, content: bytes, message: str) ->
     assert "\n" not in str(refused.value)
 
 
+def test_the_two_files_of_opencvs_sample(tmp_path: Path) -> None:
+    files = [opencv(tmp_path / "intrinsics.yml", M1=P1[:, :3], M2=P2[:, :3]), tmp_path / "extrinsics.yml"]
+    opencv(files[1], R=np.eye(3), T=np.array([[-0.12], [0], [0]]), P1=P1, P2=P2, Q=Q)
+    assert read_cameras(files, "m").calibration == EXPECTED
+
+
+def test_two_files_of_another_kind_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "c.txt").write_text("cam0=[500 0 311; 0 500 250; 0 0 1]\n")
+    with pytest.raises(CalibrationError, match="of calibrations in two files, ROS's and OpenCV's are read"):
+        read_cameras([tmp_path / "c.txt"] * 2)
+
+
+def test_a_comment_may_stand_above_opencvs_directive(tmp_path: Path) -> None:
+    path = opencv(tmp_path / "c.yml", P1=P1, P2=P2)
+    path.write_text("# the rig on the roof\n" + path.read_text())
+    assert read_cameras([path], "m").calibration == EXPECTED
+
+
 def test_opencv_needs_a_unit(tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match="does not tell its unit"):
         read_cameras([opencv(tmp_path / "c.yml", Q=Q)])

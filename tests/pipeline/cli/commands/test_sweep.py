@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from semidense.pipeline.api import Task, planned, sweep_request
 from semidense.pipeline.cli.console import print_sweep
 from semidense.pipeline.files.run_files import write_sweep
 from semidense.pipeline.plan.errors import UsageError
@@ -21,6 +22,13 @@ def test_the_table_has_every_row(rows: list[dict[str, object]], tmp_path: Path) 
     assert len(written) == len(rows)
     assert [float(row["R"]) for row in written] == [row["R"] for row in rows]
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_dry_run_plans_every_value_and_makes_nothing(trained_task: Task, trained: Result) -> None:
+    request = sweep_request(trained_task, "0.31,0.32", ["semidense.calibrated=false"])
+    plan = planned(trained_task, request)
+    assert [each.step.R for each in plan.todo() if each.step.product == "semidense"] == [0.31, 0.32]
+    assert planned(trained_task, request).todo() == plan.todo()
 
 
 def test_without_a_pixel_kept_there_is_no_picture(rows: list[dict[str, object]], tmp_path: Path) -> None:

@@ -107,7 +107,7 @@ def test_an_entry_that_vanished_is_one_line(made: Handmade) -> None:
 
 def test_an_empty_cache_says_what_to_do(tmp_path: Path) -> None:
     session = build(Document(), Store(tmp_path))
-    assert "make something with `pipeline run`" in session.panels.problem.text
+    assert "make something with `pipeline match` or `pipeline run`" in session.panels.problem.text
 
 
 def test_provenance_is_told(session: Session, shown: Handmade) -> None:
