@@ -17,6 +17,7 @@ NAMES = (
     "growth",
     "workers",
     "cached_run",
+    "own_pairs",
     "sweep",
     "memory",
 )
