@@ -268,7 +268,7 @@ def match_all(
     task = wished(task, wishes)
     dataset = task.open()
     task = replace(task, dataset=dataset)
-    if status(task, "survey").todo():
+    if not scheduler and status(task, "survey").todo():
         # The look at a new pair takes a second and does without torch, which takes as long to load.
         Thread(target=import_module, args=("torch",)).start()
     others = [look(task, watch, workers)]

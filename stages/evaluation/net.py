@@ -135,7 +135,8 @@ def _pool(maps: NDArray[Any], made: NDArray[Any]) -> None:
             upper, lower = maps[each, y].reshape(-1), maps[each, min(y + 1, height - 1)].reshape(-1)
             for k in range(width * channels):
                 columns[k] = max(upper[k], lower[k])
-            columns[width * channels :] = columns[(width - 1) * channels : width * channels]
+            for c in range(channels):
+                columns[width * channels + c] = columns[(width - 1) * channels + c]
             for x in range(2 * (width // 2)):
                 out = made[y % 2, x % 2, each, y // 2, x // 2]
                 one, two = columns[x * channels :], columns[(x + 1) * channels :]
