@@ -18,6 +18,7 @@ NAMES = (
     "workers",
     "cached_run",
     "many_scenes",
+    "own_pairs",
     "sweep",
     "memory",
 )

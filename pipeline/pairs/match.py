@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib import import_module
 from os import PathLike, fspath
 from pathlib import Path
+from threading import Thread
 from typing import Any, Literal
 
 import numpy as np
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 from semidense.datasets import Calibration, Dataset, DisparityRange, SceneSource, open_dataset
 from semidense.datasets.pairs.arrays import array_pair
 from semidense.datasets.pairs.options import PairOptions, pair_spec
-from semidense.pipeline.api import Task, run
+from semidense.pipeline.api import Task, run, status
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import findings, without_texture
 from semidense.pipeline.pairs.wishes import Wishes
@@ -261,6 +263,9 @@ def match_all(
     task = wished(task, wishes)
     dataset = task.open()
     task = replace(task, dataset=dataset)
+    if not scheduler and status(task, "survey").todo():
+        # The look at a new pair takes a second and does without torch, which takes as long to load.
+        Thread(target=import_module, args=("torch",)).start()
     products = ("survey", wishes.product, *(["right_disparity"] if wishes.right_view else []))
     survey, result, *right = (
         run(task, product, watch=watch, scheduler=scheduler, workers=workers) for product in products

@@ -21,12 +21,14 @@ are replaced or deleted. The pair's own files, and files that ``summary.json`` d
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from semidense.datasets import SceneSource
 from semidense.datasets.formats.ply import write_ply
@@ -44,6 +46,7 @@ from semidense.pipeline.files.map_files import (
     Quantity,
     write_map,
 )
+from semidense.pipeline.files.map_pictures import confidence_picture, disparity_picture
 from semidense.pipeline.files.publishing import publishing, refuse_foreign
 from semidense.pipeline.files.writing import write_rgb
 from semidense.pipeline.pairs.match import Match
@@ -51,6 +54,7 @@ from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.opening import open_product
 from semidense.stages.evaluation.calibration.table import told
 
+_Map = NDArray[np.float32]
 _SUMMARY = "summary.json"
 _QUANTITIES = (DISPARITY, RAW_DISPARITY, CONFIDENCE, DEPTH, RIGHT_DISPARITY)
 _PICTURES = {
@@ -127,47 +131,60 @@ class _Writer:
     notes: list[str] = field(default_factory=list)
 
     def write_maps(self) -> None:
-        """Write every map of numbers."""
-        self._write(DISPARITY, self.match.disparity)
-        self._write(RAW_DISPARITY, self.match.raw)
-        self._write(CONFIDENCE, self.match.confidence)
-        if self.match.scene.calibration:
-            self._write(DEPTH, self.match.depth)
-        if self.match.wishes.right_view:
-            self._write(RIGHT_DISPARITY, self.match.right_disparity)
+        """Write every map of numbers in every format, some at a time: packing them takes longest."""
+        with ThreadPoolExecutor() as pool:
+            for made in pool.map(self._write, *zip(*self._maps(), strict=True)):
+                if isinstance(made, str):
+                    self.notes.append(made)
+                else:
+                    self.files.append(made)
 
-    def _write(self, quantity: Quantity, values: np.ndarray[Any, np.dtype[np.float32]]) -> None:
-        for kind in self.formats:
-            try:
-                name, about = write_map(values, quantity, kind, self.folder)
-            except Png16Error as error:
-                self.notes.append(f"{quantity.name}.png was not written: {str(error).partition(': ')[2]}")
-            else:
-                self.files.append({"file": name, **about})
+    def _maps(self) -> Iterable[tuple[Quantity, _Map, str]]:
+        match = self.match
+        maps = [(DISPARITY, match.disparity), (RAW_DISPARITY, match.raw), (CONFIDENCE, match.confidence)]
+        maps += [(DEPTH, match.depth)] if match.scene.calibration else []
+        maps += [(RIGHT_DISPARITY, match.right_disparity)] if match.wishes.right_view else []
+        return [(*each, kind) for each in maps for kind in self.formats]
+
+    def _write(self, quantity: Quantity, values: _Map, kind: str) -> dict[str, str] | str:
+        """Write one file and return its entry in the summary; a note if the format cannot hold the values."""
+        try:
+            name, about = write_map(values, quantity, kind, self.folder)
+        except Png16Error as error:
+            return f"{quantity.name}.png was not written: {str(error).partition(': ')[2]}"
+        return {"file": name, **about}
 
     def write_pictures(self) -> None:
         """Write what is for the eye."""
-        self._draw(self.match.wishes.product, "disparity-colour.png")
-        self._draw("disparity", "disparity_raw-colour.png")
-        self._draw(self.match.wishes.confidence, "confidence-colour.png")
+        with ThreadPoolExecutor() as pool:
+            self.files += pool.map(self._draw, (DISPARITY, RAW_DISPARITY, CONFIDENCE))
         if self.match.wishes.fill:
-            write_rgb(
-                self.match.guessed.astype(np.uint8)[..., np.newaxis].repeat(3, axis=2) * 255,
-                self.folder / "guessed.png",
-            )
-            self.files.append(
-                {"file": "guessed.png", "quantity": "white: filled in, a guess", "reference view": "left"}
-            )
+            self._write_guessed()
         if self.match.misfits:
-            self._draw("survey", "survey.png")
+            self._draw_survey()
 
-    def _draw(self, product: str, name: str) -> None:
+    def _draw(self, quantity: Quantity) -> dict[str, str]:
+        match = self.match
+        values = {DISPARITY: match.disparity, RAW_DISPARITY: match.raw, CONFIDENCE: match.confidence}[quantity]
+        draw = confidence_picture if quantity is CONFIDENCE else disparity_picture
+        name = f"{quantity.name}-colour.png"
+        write_rgb(draw(values, f"{match.scene.name}: {quantity.about} ({quantity.unit})"), self.folder / name)
+        return {"file": name, "quantity": f"picture of {quantity.name}, with a legend", "reference view": "left"}
+
+    def _write_guessed(self) -> None:
+        white = self.match.guessed.astype(np.uint8)[..., np.newaxis].repeat(3, axis=2) * 255
+        write_rgb(white, self.folder / "guessed.png")
+        self.files.append({"file": "guessed.png", "quantity": "white: filled in, a guess", "reference view": "left"})
+
+    def _draw_survey(self) -> None:
         from semidense.pipeline.figures.figure import figure, product_title
         from semidense.pipeline.files.writing import save_png
 
-        dataset = open_product(self.match.result.store, self.match.made(product).key)
-        save_png(figure(product, dataset, title=product_title(dataset)), self.folder / name)
-        self.files.append({"file": name, "quantity": f"picture of {product}, with a legend", "reference view": "left"})
+        dataset = open_product(self.match.result.store, self.match.made("survey").key)
+        save_png(figure("survey", dataset, title=product_title(dataset)), self.folder / "survey.png")
+        self.files.append(
+            {"file": "survey.png", "quantity": "picture of survey, with a legend", "reference view": "left"}
+        )
 
     def write_points(self) -> None:
         """Write the cloud, if there is a calibration."""

@@ -3,7 +3,7 @@
 import ast
 import hashlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import TypeVar, cast
@@ -56,7 +56,15 @@ def _source(module: str) -> tuple[bytes, tuple[str, ...]]:
     """Return a module's source and the modules that it imports from."""
     file = sys.modules[module].__file__
     source = Path(file).read_bytes() if file else b""
-    return source, tuple(name for node in ast.walk(ast.parse(source)) for name in _imported(node))
+    return source, tuple(name for node in _statements(ast.parse(source)) for name in _imported(node))
+
+
+def _statements(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield all of a tree but its expressions, which import nothing and are most of it."""
+    for node in ast.iter_child_nodes(tree):
+        if not isinstance(node, ast.expr):
+            yield node
+            yield from _statements(node)
 
 
 def _imported(node: ast.AST) -> list[str]:

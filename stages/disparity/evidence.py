@@ -52,26 +52,28 @@ def evidence(strip: Strip, winner: NDArray[np.int32], paths: int) -> NDArray[np.
     """
     single, aggregated, d_min = strip.single, strip.aggregated, strip.single.d_min
     made = np.full((len(FEATURES), *winner.shape), np.nan, np.float32)
-    least, right = np.empty(winner.shape[1], np.uint16), np.empty(winner.shape[1], np.int32)
+    right = np.empty(winner.shape[1], np.uint32)
     for y in range(len(winner)):
-        _right_winner(aggregated[y], d_min, least, right)
+        _right_winner(aggregated[y], d_min, right)
         _evidence(single.above[y], single.least[y], aggregated[y], winner[y], right, d_min, paths, made[:, y])
     return made
 
 
 @kernel
-def _right_winner(
-    aggregated: NDArray[np.uint16], d_min: int, least: NDArray[np.uint16], right: NDArray[np.int32]
-) -> None:
-    """Write the index of the least cost of each right pixel of a row; of equal costs the smallest disparity's."""
+def _right_winner(aggregated: NDArray[np.uint16], d_min: int, right: NDArray[np.uint32]) -> None:
+    """Write the index of the least cost of each right pixel of a row; of equal costs the smallest disparity's.
+
+    Of a right pixel that no left one meets, something is written that is no index.
+    """
     width, depth = aggregated.shape
-    least[:] = np.uint16(0xFFFF)
-    right[:] = NONE
+    right[:] = np.uint32(0xFFFFFFFF)
     for x in range(width):
-        for d in range(*ends(x, width, d_min, depth)):
-            if aggregated[x, d] < least[x - d - d_min]:
-                least[x - d - d_min] = aggregated[x, d]
-                right[x - d - d_min] = d
+        first, end = ends(x, width, d_min, depth)
+        for d in range(first, end):  # cost and index in one number: many are compared at once
+            met = np.uint32(np.uint32(aggregated[x, d]) << np.uint32(16) | np.uint32(d))
+            right[x - d_min - d] = min(right[x - d_min - d], met)
+    for x in range(width):
+        right[x] &= np.uint32(0xFFFF)
 
 
 @kernel
@@ -80,14 +82,14 @@ def _evidence(
     least: NDArray[np.int16],
     aggregated: NDArray[np.uint16],
     winner: NDArray[np.int32],
-    right: NDArray[np.int32],
+    right: NDArray[np.uint32],
     d_min: int,
     paths: int,
     made: NDArray[np.float32],
 ) -> None:
     """Write the features of one row."""
     width, depth = single.shape
-    near, near_sum = np.int16(NEAR * SCALE), np.uint16(NEAR * SCALE * paths)
+    level, level_sum = np.int16(NEAR * SCALE), np.uint16(NEAR * SCALE * paths)
     for x in range(width):
         best = winner[x]
         if best == NONE:
@@ -95,44 +97,55 @@ def _evidence(
         first, end = ends(x, width, d_min, depth)
         alone = first_least(single, x, first, end)
         low, low_sum = single[x, alone], aggregated[x, best]
-        rival = _rival(single[x], alone, first, end, np.int16(low + CAP))
-        rival_sum = _rival(aggregated[x], best, first, end, np.uint16(low_sum + paths * CAP))
+        rival, near = _others(single, x, alone, np.int16(low + CAP), np.int16(low + level), first, end)
+        limits = np.uint16(low_sum + paths * CAP), np.uint16(low_sum + level_sum)
+        rival_sum, near_sum = _others(aggregated, x, best, limits[0], limits[1], first, end)
         made[0, x] = (np.int64(rival_sum) - np.int64(low_sum)) / (paths * SCALE)
         made[1, x] = (np.int64(rival) - np.int64(low)) / SCALE
         made[2, x] = single[x, best] / SCALE
         made[3, x] = (np.int64(single[x, best]) + np.int64(least[x])) / SCALE
-        made[4, x] = abs(best - right[x - best - d_min])
+        made[4, x] = abs(best - np.int64(right[x - best - d_min]))
         made[5, x] = abs(alone - best) <= 1
-        made[6, x] = _near(aggregated[x], np.uint16(low_sum + near_sum), first, end) / (end - first)
-        made[7, x] = _near(single[x], np.int16(low + near), first, end) / (end - first)
-        made[8, x] = _minima(single[x], np.int16(low + near), first, end)
+        made[6, x] = near_sum / (end - first)
+        made[7, x] = near / (end - first)
+        made[8, x] = _minima(single, x, np.int16(low + level), first, end, near)
 
 
 @kernel
-def _rival(costs: NDArray[Any], best: int, first: int, end: int, most: Any) -> Any:  # noqa: ANN401 - either integer type
-    """Return the least cost that is not beside the best, at most ``most``."""
-    for d in range(first, best - 1):
-        most = min(most, costs[d])
-    for d in range(best + 2, end):
-        most = min(most, costs[d])
-    return most
+def _others(
+    costs: NDArray[Any],
+    x: int,
+    best: int,
+    most: Any,  # noqa: ANN401 - either integer type
+    near: Any,  # noqa: ANN401
+    first: int,
+    end: int,
+) -> tuple[int, int]:
+    """Return the least of a pixel's costs that is not beside its best, at most ``most``; how many are at most ``near``.
 
-
-@kernel
-def _near(costs: NDArray[Any], most: Any, first: int, end: int) -> int:  # noqa: ANN401 - either integer type
-    """Return how many costs are at most ``most``."""
-    count = 0
+    Every number is as narrow as the costs, so that many are compared at once.
+    """
+    rival, count = most, np.uint16(0)
     for d in range(first, end):
-        count += costs[d] <= most
+        count = np.uint16(count + np.uint16(costs[x, d] <= near))
+        rival = min(rival, costs[x, d] if np.uint16(d - best + 1) > np.uint16(2) else most)
+    return int(np.int64(rival)), int(np.int64(count))
+
+
+@kernel
+def _minima(costs: NDArray[np.int16], x: int, most: np.int16, first: int, end: int, near: int) -> int:
+    """Return how many local minima of a pixel cost at most ``most``, as ``near`` costs do; a plateau is one minimum.
+
+    Each is counted where it ends.
+    """
+    count, d = 0, first
+    while near > 0:
+        if costs[x, d] <= most:
+            near -= 1
+            if d == end - 1 or costs[x, d + 1] > costs[x, d]:
+                begin = d
+                while begin > first and costs[x, begin - 1] == costs[x, d]:
+                    begin -= 1
+                count += begin == first or costs[x, begin - 1] > costs[x, d]
+        d += 1
     return count
-
-
-@kernel
-def _minima(costs: NDArray[np.int16], most: np.int16, first: int, end: int) -> int:
-    """Return how many local minima cost at most ``most``; a plateau is one."""
-    count, falling = 0, True
-    for d in range(first, end):
-        if d > first and costs[d] != costs[d - 1]:
-            count += falling and costs[d] > costs[d - 1] and costs[d - 1] <= most
-            falling = costs[d] < costs[d - 1]
-    return count + (falling and costs[end - 1] <= most)

@@ -155,7 +155,7 @@ def _is_clear(scores: _Floats, row: NDArray[np.intp], column: NDArray[np.intp]) 
     """Return whether each patch's best place is good, has it as its own best, and no rival along the row."""
     x = np.arange(len(scores))
     best = scores[x, row, column]
-    back = scores.argmax(axis=0)[row, column]
+    back = scores[:, row, column].argmax(axis=0)
     along = scores.max(axis=1)  # x, x right
     along[np.abs(np.arange(along.shape[1]) - column[:, np.newaxis]) <= 2] = -1
     clear: NDArray[np.bool_] = (best > _GOOD) & (np.abs(back - x) <= 1) & (along.max(axis=1) < best - _UNIQUE)

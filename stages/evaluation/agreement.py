@@ -43,20 +43,26 @@ def padded_agreement(disparity: NDArray[np.float32], window: int) -> NDArray[np.
     if window % 2 == 0 or not 1 <= window <= 2 * RADIUS + 1:
         raise StageError(f"the window of the agreement is {window} px, expected an odd number of at most 101")
     height, width = (length - 2 * RADIUS for length in disparity.shape)
-    agreeing = np.empty((height, width), np.int64)
+    agreeing = np.empty((height, width), np.int32)
     _count_agreeing(np.ascontiguousarray(disparity), window // 2, agreeing)
     return (agreeing / np.float64(window**2)).astype(np.float32)
 
 
 @kernel
-def _count_agreeing(disparity: NDArray[np.float32], radius: int, agreeing: NDArray[np.int64]) -> None:
-    """Count in each pixel's window those that agree with it, and the pixel itself."""
-    for y in range(agreeing.shape[0]):
-        for x in range(agreeing.shape[1]):
-            own = disparity[y + RADIUS, x + RADIUS]
-            count = 0
-            for row in range(y + RADIUS - radius, y + RADIUS + radius + 1):
-                for column in range(x + RADIUS - radius, x + RADIUS + radius + 1):
-                    if abs(disparity[row, column] - own) <= TOLERANCE:
-                        count += 1
-            agreeing[y, x] = max(count, 1)
+def _count_agreeing(disparity: NDArray[np.float32], radius: int, agreeing: NDArray[np.int32]) -> None:
+    """Count in each pixel's window those that agree with it, and the pixel itself.
+
+    A row of centres at a time is compared with the pixels that lie equally far from them.
+    """
+    height, width = agreeing.shape
+    tolerance = np.float32(TOLERANCE)
+    for y in range(height):
+        own, count = disparity[y + RADIUS, RADIUS : RADIUS + width], agreeing[y]
+        count[:] = 0
+        for row in range(y + RADIUS - radius, y + RADIUS + radius + 1):
+            for first in range(RADIUS - radius, RADIUS + radius + 1):
+                others = disparity[row, first : first + width]
+                for x in range(width):
+                    count[x] += np.int32(abs(others[x] - own[x]) <= tolerance)
+        for x in range(width):
+            count[x] = max(count[x], np.int32(1))

@@ -20,11 +20,15 @@ stay plain, and none is computed twice.
 """
 
 from collections.abc import Callable
+from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
+from semidense.stages.compute.kernel import kernel
 from semidense.stages.evaluation.declaration import PATCH, STRIDE
 
 DISPARITY_UNIT = 5.0
@@ -32,7 +36,9 @@ DISPARITY_UNIT = 5.0
 AT_ONCE = 2
 """Fragments of a map, of 16 after two poolings, that go on together."""
 Pool = Callable[[Tensor], Tensor]
-"""A way of pooling: (B, C, H, W) -> (a multiple of B, C, H // 2, W // 2)."""
+"""A way of pooling, ReLU included: (B, C, H, W) -> (a multiple of B, C, H // 2, W // 2)."""
+_BITS = {torch.float32: torch.int32, torch.bfloat16: torch.int16}
+"""The whole numbers of the same bits. Of numbers above 0 they have the same order, and those below 0 are below 0."""
 
 
 class EvaluationNet(nn.Module):
@@ -80,13 +86,13 @@ class EvaluationNet(nn.Module):
     def _early(self, maps: Tensor, pool: Pool) -> Tensor:
         """Return the first two convolutions of one layer: (B, 1, H, W) -> (B or 16 B, 32, ...)."""
         for conv in (self.conv1, self.conv2):
-            maps = functional.relu(pool(conv(maps)))  # the same as pooling last, on a quarter of the values
+            maps = pool(conv(maps))
         return maps
 
     def _late(self, gray: Tensor, disparity: Tensor, pool: Pool) -> Tensor:
         """Return the logits from what ``_early`` made of the two layers."""
-        gray, disparity = (functional.relu(pool(self.conv3(maps))) for maps in (gray, disparity))
-        return self._head(functional.relu(pool(self.conv4_gray(gray) + self.conv4_disparity(disparity))))
+        gray, disparity = (pool(self.conv3(maps)) for maps in (gray, disparity))
+        return self._head(pool(self.conv4_gray(gray) + self.conv4_disparity(disparity)))
 
     def _head(self, features: Tensor) -> Tensor:
         logits: Tensor = self.out(functional.relu(self.fc(features)))
@@ -99,24 +105,43 @@ def _halves(layers: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def _plain_pool(maps: Tensor) -> Tensor:
-    return functional.max_pool2d(maps, 2)
+    return functional.relu(functional.max_pool2d(maps, 2))  # the same as pooling last, on a quarter of the values
 
 
 def fragments(maps: Tensor) -> Tensor:
-    """Pool 2 x 2 at the four offsets (0, 0), (0, 1), (1, 0), (1, 1).
+    """Pool 2 x 2 at the four offsets (0, 0), (0, 1), (1, 0), (1, 1), and cut at 0.
 
     Args:
-        maps: (B, C, H, W).
+        maps: (B, C, H, W) float32 or bfloat16, without gradients.
 
     Returns:
         (4 B, C, H // 2, W // 2), the four offsets one after another. At an even size, the last row and
         column of the shifted fragments are made of one repeated row and column; ``dense`` cuts them off.
     """
-    height, width = maps.shape[2:]
-    padded = functional.pad(maps, (0, 1 - width % 2, 0, 1 - height % 2), mode="replicate")
-    rows, columns = (height // 2) * 2, (width // 2) * 2
-    shifted = [padded[:, :, y : y + rows, x : x + columns] for y in (0, 1) for x in (0, 1)]
-    return torch.cat([functional.max_pool2d(part, 2) for part in shifted])
+    batch, channels, height, width = maps.shape
+    bits = maps.permute(0, 2, 3, 1).contiguous().view(_BITS[maps.dtype])
+    made = torch.empty((2, 2, batch, height // 2, width // 2, channels), dtype=bits.dtype)
+    _pool(bits.numpy(), made.numpy())
+    return made.view(maps.dtype).flatten(0, 2).permute(0, 3, 1, 2)
+
+
+@kernel
+def _pool(maps: NDArray[Any], made: NDArray[Any]) -> None:
+    """Write the four fragments of maps (B, H, W, C), both as whole numbers of the same bits."""
+    batch, height, width, channels = maps.shape
+    columns = np.empty((width + 1) * channels, maps.dtype)  # the larger of two rows
+    for each in range(batch):
+        for y in range(2 * (height // 2)):
+            upper, lower = maps[each, y].reshape(-1), maps[each, min(y + 1, height - 1)].reshape(-1)
+            for k in range(width * channels):
+                columns[k] = max(upper[k], lower[k])
+            for c in range(channels):
+                columns[width * channels + c] = columns[(width - 1) * channels + c]
+            for x in range(2 * (width // 2)):
+                out = made[y % 2, x % 2, each, y // 2, x // 2]
+                one, two = columns[x * channels :], columns[(x + 1) * channels :]
+                for c in range(channels):
+                    out[c] = max(max(one[c], two[c]), 0)
 
 
 def interleave(values: Tensor) -> Tensor:

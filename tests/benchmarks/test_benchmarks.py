@@ -18,6 +18,7 @@ from benchmarks import (
     low_rank,
     many_scenes,
     memory,
+    own_pairs,
     peers,
     recipe,
     timeline,
@@ -58,6 +59,10 @@ def memory_on_little() -> None:
     memory.main(size=["48x64x4"])
 
 
+def own_pairs_on_little() -> None:
+    own_pairs.main(shrink=8, times=1)
+
+
 def training_on_little() -> None:
     training.main(batch=1, patches=1, pairs=1)
 
@@ -73,6 +78,7 @@ def workers_on_little() -> None:
         pytest.param(growth_on_little, "growth", "time a cell", id="growth"),
         pytest.param(many_scenes_on_little, "many_scenes", "explain --trace", id="many scenes"),
         pytest.param(memory_on_little, "memory", "peak of a run", id="memory"),
+        pytest.param(own_pairs_on_little, "own_pairs", "each further pair", id="own pairs"),
         pytest.param(training_on_little, "training", "times patches", id="training"),
         pytest.param(workers_on_little, "workers", "two workers", id="workers"),
     ],

@@ -42,17 +42,14 @@ def parabola(strip: Strip, index: NDArray[np.int32]) -> NDArray[np.float32]:
 
 @kernel
 def first_least(costs: NDArray[Any], x: int, first: int, end: int) -> int:
-    """Return the index of the first least of a pixel's costs; there must be one at least.
+    """Return the index of the first least of a pixel's costs, from 0 to 65535; there must be one at least.
 
     The pixel is one of a row, (x, d): to cut it out would take as long as to look through it.
     """
-    low = costs[x, first]
-    for d in range(first, end):
-        low = min(low, costs[x, d])
-    best = first
-    while costs[x, best] != low:
-        best += 1
-    return best
+    least = np.uint32(0xFFFFFFFF)
+    for d in range(first, end):  # cost and index in one number: many are compared at once
+        least = min(least, np.uint32(np.uint32(costs[x, d]) << np.uint32(16) | np.uint32(d)))
+    return int(np.int64(least & np.uint32(0xFFFF)))
 
 
 @kernel

@@ -10,6 +10,8 @@ networks with a dot product are the fast architecture of Zbontar and LeCun (JMLR
 Dilated kernels see the wider window for the price of the narrow one. It helps where there is little texture.
 """
 
+from functools import lru_cache
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -68,6 +70,8 @@ class DescriptorNet(nn.Module):
 def descriptor_net_from_parameters(parameters: NDArray[np.float32], channels: int) -> DescriptorNet:
     """Return the network that a vector of parameters belongs to, ready for inference.
 
+    It is built once for all tiles of a volume, so nobody may change it.
+
     Args:
         parameters: float32 (parameter,), as ``to_vector`` makes them.
         channels: channels a view of the images at hand.
@@ -75,11 +79,16 @@ def descriptor_net_from_parameters(parameters: NDArray[np.float32], channels: in
     Raises:
         StageError: if the network was trained on other channels.
     """
-    net = DescriptorNet(channels)
-    if count(net) != parameters.size:
+    return _built(np.ascontiguousarray(parameters, np.float32).tobytes(), channels)
+
+
+@lru_cache(maxsize=2)
+def _built(parameters: bytes, channels: int) -> DescriptorNet:
+    net, vector = DescriptorNet(channels), np.frombuffer(parameters, np.float32)
+    if count(net) != vector.size:
         raise StageError(
-            f"the descriptor-Net's {parameters.size} parameters do not fit {channels} channel(s) a view: "
+            f"the descriptor-Net's {vector.size} parameters do not fit {channels} channel(s) a view: "
             "it was trained on other channels; train one for these, or go back to the channels it knows"
         )
-    from_vector(net, parameters)
+    from_vector(net, vector)
     return net.to(memory_format=torch.channels_last)  # type: ignore[call-overload, no-any-return]

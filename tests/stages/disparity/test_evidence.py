@@ -42,6 +42,7 @@ def last(costs: list[float], sums: list[float]) -> dict[str, float]:
         pytest.param([N, N, 0, N], [9] * 4, "single_flatness", 0.25, id="one cost that was judged"),
         pytest.param([0, 9, 1, 9, 2], [9] * 5, "single_minima", 2, id="two minima within 1"),
         pytest.param([5, 0, 0, 5, 0], [9] * 5, "single_minima", 2, id="a plateau is one"),
+        pytest.param([1, 1, 9, 0, 9], [9] * 5, "single_minima", 2, id="a plateau before the least"),
         pytest.param([5, 5, 5, 5, 5], [9] * 5, "single_minima", 1, id="a flat curve is one plateau"),
         pytest.param([0, 1, 0, 1, 0], [9] * 5, "single_minima", 3, id="stripes"),
         pytest.param([5, 4, 3, 2, 1], [9] * 5, "single_minima", 1, id="falling to the end"),

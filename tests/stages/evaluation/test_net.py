@@ -107,6 +107,17 @@ def test_fragments_of_an_even_size_repeat_the_last_row_and_column() -> None:
     assert made[:, 0].tolist() == [[[5, 7]], [[6, 7]], [[5, 7]], [[6, 7]]]
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+@pytest.mark.parametrize("size", [(7, 9), (8, 9), (7, 10), (8, 6)])
+def test_fragments_are_pooled_and_cut_at_0_as_torch_does_it(size: tuple[int, int], dtype: torch.dtype) -> None:
+    maps = torch.randn(2, 3, *size, generator=torch.Generator().manual_seed(0)).to(dtype)
+    height, width = size
+    for index, made in enumerate(fragments(maps).split(2)):
+        shifted = maps[:, :, index // 2 :, index % 2 :]
+        expected = torch.max_pool2d(shifted, 2, ceil_mode=True)[:, :, : height // 2, : width // 2].relu()
+        assert torch.equal(made, expected)
+
+
 def test_fragments_keep_the_batch_together() -> None:
     maps = torch.stack([torch.zeros(1, 3, 3), torch.ones(1, 3, 3)])
     assert fragments(maps).flatten().tolist() == [0, 1] * 4
