@@ -42,6 +42,16 @@ class TrainingParams(Params):
     shipped: tuple[Literal["matching_net", "descriptor_net", "evaluation_net"], ...] = Field(
         (), description="networks that --train does not train but takes from the package"
     )
+    weights: Literal["indoor", "general"] = Field(
+        "indoor",
+        description="which of the package's weights are used: indoor, of Middlebury's 29 training scenes, or general, "
+        "where there are any: of these and 116 streets (KITTI 2012)",
+    )
+    cross_fit: bool = Field(
+        False,
+        description="what learns from maps of training scenes takes maps by networks that have not seen the scene, "
+        "which are as wrong as those of new scenes",
+    )
 
 
 class Config(BaseModel):

@@ -14,6 +14,8 @@ from semidense.stages.stage import Array, Inputs, Stage, StageError
 
 _LEARNT_FROM_MAPS = ("evaluation_net", "calibration")
 """Products of which those for guided volumes are others: the errors of such maps hang together."""
+_GENERAL = ("descriptor_net", "evaluation_net", "evidence_net", "calibration")
+"""Products that ``training.weights=general`` has weights of its own for: those of the preset ``robust``."""
 _CALIBRATED = ("confidence", "disparity", "costvolume")
 """Products that a calibration is about: it is of no use for those that other stages make."""
 
@@ -61,7 +63,8 @@ def weights_of(config: Config, product: str) -> Weights:
     if file := config.choice("weights", product):
         return own_weights(product, Path(file).expanduser())
     made_by = [config.choice("use", name) or name for name in _CALIBRATED]
-    return shipped_weights(product, config.of("costvolume", CostVolumeParams).mode, *made_by)
+    general = config.training.weights == "general"
+    return shipped_weights(product, config.of("costvolume", CostVolumeParams).mode, *made_by, general=general)
 
 
 def shipped_weights(
@@ -70,13 +73,14 @@ def shipped_weights(
     confidence: str = _CALIBRATED[0],
     disparity: str = _CALIBRATED[1],
     costvolume: str = _CALIBRATED[2],
+    general: bool = False,
 ) -> Weights:
     """Return the package's weights of a product, for volumes of a mode and what makes confidence, map and costs.
 
     Raises:
         StageError: if this installation has none.
     """
-    name = weights_name(product, mode, confidence, disparity, costvolume)
+    name = weights_name(product, mode, confidence, disparity, costvolume, general)
     return Weights(product, name, None, weights_digest(name))
 
 
@@ -102,6 +106,7 @@ def weights_name(
     confidence: str = _CALIBRATED[0],
     disparity: str = _CALIBRATED[1],
     costvolume: str = _CALIBRATED[2],
+    general: bool = False,
 ) -> str:
     """Return the name of a product's shipped weights, for volumes of a mode and what makes confidence, map and costs.
 
@@ -109,13 +114,18 @@ def weights_name(
 
     >>> weights_name("evaluation_net", "guided"), weights_name("matching_net", "guided")
     ('evaluation_net.guided', 'matching_net')
-    >>> weights_name("calibration", "fast", "evidence_confidence", "aggregated")
-    'calibration.evidence_confidence.aggregated'
+    >>> weights_name("descriptor_net", "fast", general=True)
+    'descriptor_net.general'
+    >>> weights_name("calibration", "fast", "evidence_confidence", "aggregated", general=True)
+    'calibration.general.evidence_confidence.aggregated.fast'
     """
     others = [name for name in (confidence, disparity, costvolume) if name not in _CALIBRATED]
+    own = general and product in _GENERAL
     if product == "calibration" and others:
-        return ".".join((product, *others))
-    return f"{product}.guided" if mode == "guided" and product in _LEARNT_FROM_MAPS else product
+        kind = [*others, mode]
+    else:
+        kind = ["guided"] if mode == "guided" and product in _LEARNT_FROM_MAPS and not own else []
+    return ".".join([product, *(["general"] if own else []), *kind])
 
 
 def weights_file(name: str) -> Traversable:
