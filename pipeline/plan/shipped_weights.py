@@ -62,9 +62,9 @@ def weights_of(config: Config, product: str) -> Weights:
     """
     if file := config.choice("weights", product):
         return own_weights(product, Path(file).expanduser())
-    made_by = [config.choice("use", name) or name for name in _CALIBRATED]
-    general = config.training.weights == "general"
-    return shipped_weights(product, config.of("costvolume", CostVolumeParams).mode, *made_by, general=general)
+    confidence, disparity, costvolume = (config.choice("use", name) or name for name in _CALIBRATED)
+    mode, general = config.of("costvolume", CostVolumeParams).mode, config.training.weights == "general"
+    return shipped_weights(product, mode, confidence, disparity, costvolume, general)
 
 
 def shipped_weights(
