@@ -32,7 +32,7 @@ from semidense.pipeline.plan.steps import (
     products,
     scope_of,
 )
-from semidense.pipeline.plan.training_split import outside, with_folds
+from semidense.pipeline.plan.training_split import outside, spread, with_folds
 from semidense.stages.catalog import READ, STAGES
 from semidense.stages.compute.precision import resolve
 from semidense.stages.evaluation.calibration.declaration import CalibrationParams
@@ -100,7 +100,8 @@ class _Builder:
         config: of these steps.
         request: what they are for.
         known: ids of the steps that it added, by product and scene.
-        unseeing: by training scene, the builder whose networks have not seen it; the folds share it with the whole.
+        unseeing: by training scene, the builder whose networks have not seen it; folds share it with the whole.
+        mapped: ids of the training scenes whose maps are learnt from; folds have those of the whole.
     """
 
     graph: Graph
@@ -108,6 +109,7 @@ class _Builder:
     request: Request
     known: dict[tuple[str, int], str] = field(default_factory=dict)
     unseeing: dict[int, "_Builder"] = field(default_factory=dict)
+    mapped: set[int] = field(default_factory=set)
 
     def product(self, product: str, scene: SceneSource | None) -> str:
         """Add the step of a product, and before it those it is made from; return its id."""
@@ -168,15 +170,29 @@ class _Builder:
     def _inputs(self, stage: Stage, product: str, scene: SceneSource | None) -> tuple[str, ...]:
         if not (stage.scope == "split" and scope_of(product) == "scene"):
             return (self.product(product, scene),)
-        if stage.cross_fitted or self.config.training.cross_fit:
-            return tuple(self._not_having_seen(source).product(product, source) for source in self.request.training)
-        return tuple(self.product(product, source) for source in self.request.training)
+        if not any("costvolume" in made_from(each) for each in stage.inputs):
+            return tuple(self.product(product, source) for source in self.request.training)
+        cross_fitted = stage.cross_fitted or self.config.training.cross_fit
+        return tuple(
+            (self._not_having_seen(source) if cross_fitted else self).product(product, source)
+            for source in self._mapped()
+        )
 
     def _add_cross_fitted(self, product: str) -> str:
         """Add a product of all training scenes, each scored by networks that learnt from other folds."""
         stage, config = STAGES[product], self._with_folds()
         inputs = {name: self._inputs(stage, name, None) for name in stage.inputs}
-        return replace(self, config=config)._add_stage(stage, config.section(product), None, inputs)
+        params = config.of(product, CalibrationParams)
+        every = zip(self.request.training, params.fold_of_scene or (), strict=True)
+        folds = tuple(fold for scene, fold in every if scene in self._mapped())
+        params = params.model_copy(update={"fold_of_scene": folds})
+        return replace(self, config=config)._add_stage(stage, params, None, inputs)
+
+    def _mapped(self) -> list[SceneSource]:
+        """Return the training scenes whose maps are learnt from; a fold has those that the whole has."""
+        scenes = self.request.training
+        self.mapped = self.mapped or {id(scene) for scene in spread(scenes, self.config.training.maps)}
+        return [scene for scene in scenes if id(scene) in self.mapped]
 
     def _with_folds(self) -> Config:
         return with_folds(self.config, [scene.name for scene in self.request.training])

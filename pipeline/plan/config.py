@@ -43,14 +43,13 @@ class TrainingParams(Params):
         (), description="networks that --train does not train but takes from the package"
     )
     weights: Literal["indoor", "general"] = Field(
-        "indoor",
-        description="which of the package's weights are used: indoor, of Middlebury's 29 training scenes, or general, "
-        "where there are any: of these and 116 streets (KITTI 2012)",
+        "indoor", description="the package's set: of 29 indoor scenes; or general, of these and 116 streets"
+    )
+    maps: int | None = Field(
+        None, ge=2, description="most scenes of each data set whose maps are learnt from, spread evenly; default: all"
     )
     cross_fit: bool = Field(
-        False,
-        description="what learns from maps of training scenes takes maps by networks that have not seen the scene, "
-        "which are as wrong as those of new scenes",
+        False, description="learn from maps that networks made which have not seen the scene: as wrong as new maps"
     )
 
 

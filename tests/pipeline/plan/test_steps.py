@@ -116,6 +116,17 @@ def test_cross_fitted_maps_are_by_networks_that_have_not_seen_the_scene(upto: st
         assert {made.steps[each].scene for each in made.steps[net].inputs["images"]}.isdisjoint({step.scene})
 
 
+def test_the_maps_that_are_learnt_from_can_be_fewer_than_the_scenes_of_the_costs() -> None:
+    many = open_dataset("synthetic:train=6,test=1,height=64,width=80,disparities=8")
+    made = graph("training.maps=2", "training.cross_fit=true", upto="calibration", train=True, dataset=many)
+    names = {step.scene for step in made.steps.values() if step.product == "disparity"}
+    assert names == {"train-2", "train-5"}
+    ((target, _),) = made.targets
+    assert made.steps[target].settings["fold_of_scene"] == [0, 1]
+    learnt = {step.scene for step in made.steps.values() if step.product == "channels"}
+    assert learnt == {f"train-{number}" for number in range(6)}
+
+
 def test_a_calibration_takes_the_cross_fitted_maps_of_the_evidence() -> None:
     made = graph(*PRESETS["robust"], upto="calibration", train=True)
     ((target, _),) = made.targets
