@@ -168,7 +168,7 @@ def _missing(name: str) -> str:
     if mode not in ("", "guided"):
         return (
             f"no calibration of {mode.replace('.', ' and ')} comes with this installation: a wanted error and "
-            "calibrated probabilities need one; give R or a density instead, take the preset paper, or give a "
+            "calibrated probabilities need one; give R or a density instead, take a preset as it is, or give a "
             "calibration of your own (weights.calibration=FILE)"
         )
     of_mode = f" MODE={mode}" if mode else ""
