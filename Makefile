@@ -9,7 +9,7 @@ ifeq ($(filter exact guided,$(MODE)),)
 $(error MODE=$(MODE): the weights that come with the package are of exact and of guided volumes)
 endif
 
-.PHONY: demo test lint train descriptors evaluation evidence calibration bench faults silence wheel clean
+.PHONY: demo test lint train descriptors evaluation evidence calibration train-general bench faults silence wheel clean
 
 demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
 	$(BIN)/pipeline run motorcycle --output demo
@@ -41,11 +41,24 @@ evaluation: $(READY)  ## DATA=DIR MODE=guided: train the evaluation-Net of such 
 		--set 'training.shipped=["matching_net", "descriptor_net"]' --output build/$(MODE)
 	cp build/$(MODE)/evaluation_net.safetensors stages/weights/evaluation_net$(OF_MODE).safetensors
 
-evidence: $(READY)  ## DATA=DIR: train what weighs the evidence of the preset robust, and put its weights in place
+evidence: $(READY)  ## DATA=DIR: train what weighs the evidence of indoor aggregated maps, and put its weights in place
 	@test -n "$(DATA)" || { echo "make evidence: say where the Middlebury sets are: make evidence DATA=DIR"; exit 2; }
 	$(BIN)/pipeline run middlebury:$(DATA) --preset robust --train --upto evidence_net --output build/robust \
+		--set training.weights=indoor --set training.cross_fit=false \
 		--set 'training.shipped=["matching_net", "descriptor_net", "evaluation_net"]'
 	cp build/robust/evidence_net.safetensors stages/weights/
+
+train-general: $(READY)  ## DATA=DIR: train the preset robust on DIR/middlebury and DIR/kitti2012, and put its weights in place
+	@test -n "$(DATA)" || { echo "make train-general: say where the data is: make train-general DATA=DIR"; exit 2; }
+	for product in descriptor_net evidence_net evaluation_net calibration; do \
+		$(BIN)/pipeline run middlebury:$(DATA)/middlebury+kitti2012:$(DATA)/kitti2012 --preset robust --train \
+			--upto $$product --output build/general/$$product || exit; \
+	done
+	for net in descriptor_net evidence_net evaluation_net; do \
+		cp build/general/$$net/$$net.safetensors stages/weights/$$net.general.safetensors; \
+	done
+	cp build/general/calibration/calibration.safetensors \
+		stages/weights/calibration.general.evidence_confidence.aggregated.fast.safetensors
 
 calibration: $(READY)  ## DATA=DIR MODE=guided: measure on the same scenes what its confidence is worth, put the table in place
 	@test -n "$(DATA)" || { echo "make calibration: say where the Middlebury sets are: make calibration DATA=DIR"; exit 2; }

@@ -20,7 +20,7 @@ from semidense.stages.disparity.declaration import (
 from semidense.stages.disparity.survey import SURVEY
 from semidense.stages.evaluation.calibration.declaration import CALIBRATED_CONFIDENCE, CALIBRATION
 from semidense.stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
-from semidense.stages.evaluation.evidence.declaration import EVIDENCE_CONFIDENCE, EVIDENCE_NET
+from semidense.stages.evaluation.evidence.declaration import EVIDENCE_CONFIDENCE, EVIDENCE_NET, EVIDENCE_SAMPLES
 from semidense.stages.evaluation.filtering import SEMIDENSE
 from semidense.stages.evaluation.silence.declaration import COST_MARGIN, DISTINCTIVENESS
 from semidense.stages.matching.declaration import COST_VOLUME, DESCRIPTOR_NET, MATCHING_NET, MATCHING_SAMPLES
@@ -44,6 +44,7 @@ CATALOG: tuple[Stage, ...] = (
     RIGHT_AGGREGATED,
     EVALUATION_SAMPLES,
     EVALUATION_NET,
+    EVIDENCE_SAMPLES,
     EVIDENCE_NET,
     CONFIDENCE,
     EVIDENCE_CONFIDENCE,

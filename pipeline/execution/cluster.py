@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -21,11 +21,15 @@ _PAUSE, _LOOK = 0.02, 1.0
 """Seconds between two looks at what is done, and at who is there."""
 
 
-def run_on_cluster(graph: Callable[[], Sequence[Any]], lease: Lease, watch: Watch, address: str) -> dict[str, Made]:
-    """Compute delayed results on a cluster and return them by their step's id, in their order.
+Tasks = tuple[Mapping[str, Any], Sequence[str]]
+"""Dask's tasks by key, and the keys of those whose results are wanted."""
+
+
+def run_on_cluster(tasks: Callable[[], Tasks], lease: Lease, watch: Watch, address: str) -> dict[str, Made]:
+    """Carry out tasks on a cluster and return the results by their step's id, in their order.
 
     Args:
-        graph: gives the delayed ``Made`` of each step.
+        tasks: gives the tasks; wanted are the ``Made`` of each step.
         lease: of the run; its drafts are gone at the end, however that comes.
         watch: told of each product that was made.
         address: of the scheduler.
@@ -37,7 +41,8 @@ def run_on_cluster(graph: Callable[[], Sequence[Any]], lease: Lease, watch: Watc
     import distributed  # noqa: F401 - which sets up its loggers
 
     with _quietly(), _explained(address), _connected(address) as client:
-        futures = client.compute(list(graph()))
+        graph, keys = tasks()
+        futures = client.get(graph, list(keys), sync=False)
         try:
             made = {each.step.id: each for each in _arriving(client, futures, watch)}
         except BaseException:

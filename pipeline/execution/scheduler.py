@@ -5,13 +5,14 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext, suppress
+from functools import partial
 from typing import Any
 from uuid import uuid4
 
 from semidense.cache import CacheUnavailable, Lease, Store
 from semidense.pipeline.execution import tasks
 from semidense.pipeline.execution.claims import Claims, LocalClaims
-from semidense.pipeline.execution.cluster import SETTLE_SECONDS, run_on_cluster
+from semidense.pipeline.execution.cluster import SETTLE_SECONDS, Tasks, run_on_cluster
 from semidense.pipeline.execution.jobs import Context
 from semidense.pipeline.execution.proof import runner_code
 from semidense.pipeline.execution.tiles import cut_rows
@@ -61,13 +62,12 @@ def _there(planned: Planned) -> Made:
 
 
 def _on_threads(plan: Plan, context: Context, threads: int) -> dict[str, Made]:
-    import dask
     from dask.threaded import get
 
-    results, lease = _graph(plan, context), context.claims.lease
+    (graph, keys), lease = _graph(plan, context), context.claims.lease
     pool = ThreadPoolExecutor(threads)
     try:
-        made: Sequence[Made] = dask.compute(*results, scheduler=get, pool=pool)  # by its name, distributed is loaded
+        made: Sequence[Made] = get(graph, keys, pool=pool)
     except Exception:
         # The failed task's siblings go on for a while: what they write must not outlive the drafts.
         context.claims.stop()
@@ -93,39 +93,56 @@ def _discard(lease: Lease) -> None:
         lease.discard_drafts()
 
 
-def _graph(plan: Plan, context: Context) -> list[Any]:
-    """Return one delayed ``Made`` a step, in the order of the plan."""
-    from dask import delayed
+def _graph(plan: Plan, context: Context) -> Tasks:
+    """Return Dask's tasks by key, and the keys of each step's ``Made`` in the order of the plan.
 
+    The tasks are of Dask's own kind: ``dask.delayed`` goes through all that comes before a task whenever one is added.
+    """
+    graph: dict[str, Any] = {}
+    shared = _add_value(graph, "context", context)
     results: dict[str, Any] = {}
     for planned in plan.steps:
         if planned.state == "hit":
-            results[planned.step.id] = delayed(_there(planned), traverse=False)
+            results[planned.step.id] = _add_value(graph, planned.step.product, _there(planned))
         else:
-            results[planned.step.id] = _delayed_step(planned.step, plan, context, results)
-    return list(results.values())
+            results[planned.step.id] = _add_step(graph, planned.step, plan, shared, results)
+    return graph, [made.key for made in results.values()]
 
 
-def _delayed_step(step: Step, plan: Plan, context: Context, results: Mapping[str, Any]) -> Any:  # noqa: ANN401
-    """Return a step's delayed ``Made``."""
-    from dask import delayed
+def _add_value(graph: dict[str, Any], name: str, value: Any) -> Any:  # noqa: ANN401
+    """Add a value that tasks share, and return what refers to it."""
+    from dask._task_spec import DataNode, TaskRef
 
-    def task(function: Any, *arguments: Any) -> Any:  # noqa: ANN401
-        # Dask's profilers and dashboard show the name; it is new each time, for a cluster keeps results by it.
-        name = f"{step.product}-{function.__name__}-{uuid4().hex}"
-        return delayed(function, pure=False, traverse=False)(*arguments, dask_key_name=name)
+    key = f"{name}-{uuid4().hex}"
+    graph[key] = DataNode(key, value)
+    return TaskRef(key)
 
-    shared = delayed(context, traverse=False)
-    inputs = [results[each] for each in dict.fromkeys(each for ids in step.inputs.values() for each in ids)]
-    forced = step.product in plan.forced
-    job = task(tasks.begin, shared, delayed(step, traverse=False), inputs, forced, tasks.len_tiles(step))
+
+def _add_task(graph: dict[str, Any], product: str, function: Any, *arguments: Any) -> Any:  # noqa: ANN401
+    """Add a task, and return what refers to its result."""
+    from dask._task_spec import Task, TaskRef
+
+    # Dask's profilers and dashboard show the key; it is new each time, for a cluster keeps results by it.
+    key = f"{product}-{function.__name__}-{uuid4().hex}"
+    graph[key] = Task(key, function, *arguments)
+    return TaskRef(key)
+
+
+def _add_step(graph: dict[str, Any], step: Step, plan: Plan, shared: Any, results: Mapping[str, Any]) -> Any:  # noqa: ANN401
+    """Add the tasks of a step, and return what refers to its ``Made``."""
+    from dask._task_spec import List
+
+    add = partial(_add_task, graph, step.product)
+    inputs = List(*(results[each] for each in dict.fromkeys(each for ids in step.inputs.values() for each in ids)))
+    own, forced = _add_value(graph, step.product, step), step.product in plan.forced
+    job = add(tasks.begin, shared, own, inputs, forced, tasks.len_tiles(step))
     if step.stage.tile_rows is None or step.size is None:
-        parts = [task(tasks.make_whole, shared, job)]
+        parts = [add(tasks.make_whole, shared, job)]
     else:
-        ready = task(tasks.create_arrays, job)
+        ready = add(tasks.create_arrays, job)
         rows = cut_rows(step.size[0], step.stage.tile_rows)
-        parts = [task(tasks.make_tile, shared, ready, delayed(each, traverse=False)) for each in rows]
-    return task(tasks.publish, shared, job, parts)
+        parts = [add(tasks.make_tile, shared, ready, _add_value(graph, "rows", each)) for each in rows]
+    return add(tasks.publish, shared, job, List(*parts))
 
 
 def totals(made: Iterable[Made]) -> dict[str, tuple[int, int]]:

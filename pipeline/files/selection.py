@@ -1,5 +1,6 @@
 """Choose which results of a run are written as files, and name the files."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -36,7 +37,7 @@ def wanted(result: Result, products: Sequence[str]) -> list[Wanted]:
     """Return the results of some products that stand behind what a run was asked for, scene by scene.
 
     Those of the scenes asked for and of the training split; not those of scenes that were only trained on, nor the
-    networks of the folds of a calibration.
+    networks of folds.
     """
     found: dict[tuple[str, str], dict[str, str]] = {}
     for step_id, variant in result.plan.targets:
@@ -44,6 +45,7 @@ def wanted(result: Result, products: Sequence[str]) -> list[Wanted]:
         split = [step for step in behind if step.scene == SPLIT]
         for step in [*split, *lineage(result.made, step_id)]:
             found.setdefault((step.scene, step.product), {}).setdefault(step.id, variant)
+    found = {kind: _without_folds(variants) for kind, variants in found.items()}
     scenes = dict.fromkeys(scene for scene, _ in found)
     kinds = [(scene, product) for scene in scenes for product in products if (scene, product) in found]
     return [
@@ -51,6 +53,16 @@ def wanted(result: Result, products: Sequence[str]) -> list[Wanted]:
         for scene, product in kinds
         for step_id, stem in _stems(result.made, product, found[scene, product]).items()
     ]
+
+
+def _without_folds(variants: Mapping[str, str]) -> dict[str, str]:
+    """Return the steps that are alone of their kind in their variant: of networks of folds there are several.
+
+    >>> _without_folds({"step 1": "R=0.8", "step 2": "R=0.9", "step 3": "R=0.9"})
+    {'step 1': 'R=0.8'}
+    """
+    counts = Counter(variants.values())
+    return {step_id: variant for step_id, variant in variants.items() if counts[variant] == 1}
 
 
 def _stems(made: Mapping[str, Made], product: str, variants: Mapping[str, str]) -> dict[str, str]:

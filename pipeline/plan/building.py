@@ -32,7 +32,7 @@ from semidense.pipeline.plan.steps import (
     products,
     scope_of,
 )
-from semidense.pipeline.plan.training_split import outside, with_folds
+from semidense.pipeline.plan.training_split import outside, spread, with_folds
 from semidense.stages.catalog import READ, STAGES
 from semidense.stages.compute.precision import resolve
 from semidense.stages.evaluation.calibration.declaration import CalibrationParams
@@ -100,12 +100,16 @@ class _Builder:
         config: of these steps.
         request: what they are for.
         known: ids of the steps that it added, by product and scene.
+        unseeing: by training scene, the builder whose networks have not seen it; folds share it with the whole.
+        mapped: ids of the training scenes whose maps are learnt from; folds have those of the whole.
     """
 
     graph: Graph
     config: Config
     request: Request
     known: dict[tuple[str, int], str] = field(default_factory=dict)
+    unseeing: dict[int, "_Builder"] = field(default_factory=dict)
+    mapped: set[int] = field(default_factory=set)
 
     def product(self, product: str, scene: SceneSource | None) -> str:
         """Add the step of a product, and before it those it is made from; return its id."""
@@ -164,24 +168,44 @@ class _Builder:
         return replace(stage, product=product), self.config.section(stage.section or other)
 
     def _inputs(self, stage: Stage, product: str, scene: SceneSource | None) -> tuple[str, ...]:
-        if stage.scope == "split" and scope_of(product) == "scene":
+        if not (stage.scope == "split" and scope_of(product) == "scene"):
+            return (self.product(product, scene),)
+        if not any("costvolume" in made_from(each) for each in stage.inputs):
             return tuple(self.product(product, source) for source in self.request.training)
-        return (self.product(product, scene),)
+        cross_fitted = stage.cross_fitted or self.config.training.cross_fit
+        return tuple(
+            (self._not_having_seen(source) if cross_fitted else self).product(product, source)
+            for source in self._mapped()
+        )
 
     def _add_cross_fitted(self, product: str) -> str:
         """Add a product of all training scenes, each scored by networks that learnt from other folds."""
-        scenes = self.request.training
-        config = with_folds(self.config, [scene.name for scene in scenes])
+        stage, config = STAGES[product], self._with_folds()
+        inputs = {name: self._inputs(stage, name, None) for name in stage.inputs}
         params = config.of(product, CalibrationParams)
-        folds = params.fold_of_scene or ()
-        requests = {fold: replace(self.request, training=outside(scenes, folds, fold)) for fold in set(folds)}
-        builders = {fold: replace(self, config=config, request=requests[fold], known={}) for fold in requests}
-        stage = STAGES[product]
-        inputs = {
-            name: tuple(builders[fold].product(name, scene) for scene, fold in zip(scenes, folds, strict=True))
-            for name in stage.inputs
-        }
+        every = zip(self.request.training, params.fold_of_scene or (), strict=True)
+        folds = tuple(fold for scene, fold in every if scene in self._mapped())
+        params = params.model_copy(update={"fold_of_scene": folds})
         return replace(self, config=config)._add_stage(stage, params, None, inputs)
+
+    def _mapped(self) -> list[SceneSource]:
+        """Return the training scenes whose maps are learnt from; a fold has those that the whole has."""
+        scenes = self.request.training
+        self.mapped = self.mapped or {id(scene) for scene in spread(scenes, self.config.training.maps)}
+        return [scene for scene in scenes if id(scene) in self.mapped]
+
+    def _with_folds(self) -> Config:
+        return with_folds(self.config, [scene.name for scene in self.request.training])
+
+    def _not_having_seen(self, scene: SceneSource) -> "_Builder":
+        """Return the builder whose networks learn from the folds that a training scene is not in."""
+        if not self.unseeing:
+            scenes, config = self.request.training, self._with_folds()
+            folds = config.of("calibration", CalibrationParams).fold_of_scene or ()
+            requests = {fold: replace(self.request, training=outside(scenes, folds, fold)) for fold in set(folds)}
+            builders = {fold: replace(self, config=config, request=requests[fold], known={}) for fold in requests}
+            self.unseeing.update({id(each): builders[fold] for each, fold in zip(scenes, folds, strict=True)})
+        return self.unseeing[id(scene)]
 
     def _add_source(self, source: Source, scene: SceneSource) -> str:
         identity = source.identity(scene)

@@ -42,6 +42,15 @@ class TrainingParams(Params):
     shipped: tuple[Literal["matching_net", "descriptor_net", "evaluation_net"], ...] = Field(
         (), description="networks that --train does not train but takes from the package"
     )
+    weights: Literal["indoor", "general"] = Field(
+        "indoor", description="the package's set: of 29 indoor scenes; or general, of these and 116 streets"
+    )
+    maps: int | None = Field(
+        None, ge=2, description="most scenes of each data set whose maps are learnt from, spread evenly; default: all"
+    )
+    cross_fit: bool = Field(
+        False, description="learn from maps that networks made which have not seen the scene: as wrong as new maps"
+    )
 
 
 class Config(BaseModel):

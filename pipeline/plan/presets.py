@@ -9,6 +9,12 @@ PRESETS: Mapping[str, tuple[str, ...]] = {
         "use.disparity=aggregated",
         "use.right_disparity=right_aggregated",
         "use.confidence=evidence_confidence",
+        "training.weights=general",
+        "training.cross_fit=true",
+        "training.maps=24",
+        "matching_samples.dense_share=0.5",
+        "descriptor_net.steps=5000",
+        "evaluation_net.steps=800",
     ),
 }
 """The settings of each preset that differ from the defaults.

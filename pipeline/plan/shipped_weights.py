@@ -15,6 +15,8 @@ from semidense.stages.stage import Array, Inputs, Stage, StageError
 
 _LEARNT_FROM_MAPS = ("evaluation_net", "calibration")
 """Products of which those for guided volumes are others: the errors of such maps hang together."""
+_GENERAL = ("descriptor_net", "evaluation_net", "evidence_net", "calibration")
+"""Products that ``training.weights=general`` has weights of its own for: those of the preset ``robust``."""
 _CALIBRATED = ("confidence", "disparity", "costvolume")
 """Products that a calibration is about: it is of no use for those that other stages make."""
 
@@ -61,8 +63,9 @@ def weights_of(config: Config, product: str) -> Weights:
     """
     if file := config.choice("weights", product):
         return own_weights(product, user_path(file))
-    made_by = [config.choice("use", name) or name for name in _CALIBRATED]
-    return shipped_weights(product, config.of("costvolume", CostVolumeParams).mode, *made_by)
+    confidence, disparity, costvolume = (config.choice("use", name) or name for name in _CALIBRATED)
+    mode, general = config.of("costvolume", CostVolumeParams).mode, config.training.weights == "general"
+    return shipped_weights(product, mode, confidence, disparity, costvolume, general)
 
 
 def shipped_weights(
@@ -71,13 +74,14 @@ def shipped_weights(
     confidence: str = _CALIBRATED[0],
     disparity: str = _CALIBRATED[1],
     costvolume: str = _CALIBRATED[2],
+    general: bool = False,
 ) -> Weights:
     """Return the package's weights of a product, for volumes of a mode and what makes confidence, map and costs.
 
     Raises:
         StageError: if this installation has none.
     """
-    name = weights_name(product, mode, confidence, disparity, costvolume)
+    name = weights_name(product, mode, confidence, disparity, costvolume, general)
     return Weights(product, name, None, weights_digest(name))
 
 
@@ -103,6 +107,7 @@ def weights_name(
     confidence: str = _CALIBRATED[0],
     disparity: str = _CALIBRATED[1],
     costvolume: str = _CALIBRATED[2],
+    general: bool = False,
 ) -> str:
     """Return the name of a product's shipped weights, for volumes of a mode and what makes confidence, map and costs.
 
@@ -110,13 +115,18 @@ def weights_name(
 
     >>> weights_name("evaluation_net", "guided"), weights_name("matching_net", "guided")
     ('evaluation_net.guided', 'matching_net')
-    >>> weights_name("calibration", "fast", "evidence_confidence", "aggregated")
-    'calibration.evidence_confidence.aggregated'
+    >>> weights_name("descriptor_net", "fast", general=True)
+    'descriptor_net.general'
+    >>> weights_name("calibration", "fast", "evidence_confidence", "aggregated", general=True)
+    'calibration.general.evidence_confidence.aggregated.fast'
     """
     others = [name for name in (confidence, disparity, costvolume) if name not in _CALIBRATED]
+    own = general and product in _GENERAL
     if product == "calibration" and others:
-        return ".".join((product, *others))
-    return f"{product}.guided" if mode == "guided" and product in _LEARNT_FROM_MAPS else product
+        kind = [*others, mode]
+    else:
+        kind = ["guided"] if mode == "guided" and product in _LEARNT_FROM_MAPS and not own else []
+    return ".".join([product, *(["general"] if own else []), *kind])
 
 
 def weights_file(name: str) -> Traversable:
@@ -159,7 +169,7 @@ def _missing(name: str) -> str:
     if mode not in ("", "guided"):
         return (
             f"no calibration of {mode.replace('.', ' and ')} comes with this installation: a wanted error and "
-            "calibrated probabilities need one; give R or a density instead, take the preset paper, or give a "
+            "calibrated probabilities need one; give R or a density instead, take a preset as it is, or give a "
             "calibration of your own (weights.calibration=FILE)"
         )
     of_mode = f" MODE={mode}" if mode else ""

@@ -66,6 +66,26 @@ def outside(scenes: Sequence[_Scene], folds: Sequence[int], fold: int) -> tuple[
     return tuple(scene for scene, other in zip(scenes, folds, strict=True) if other != fold)
 
 
+def spread(scenes: Sequence[SceneSource], most: int | None) -> tuple[SceneSource, ...]:
+    """Return at most so many scenes of each data set, evenly spread over it, in their order; all for None."""
+    if most is None:
+        return tuple(scenes)
+    sets: dict[str, list[SceneSource]] = {}
+    for scene in scenes:
+        sets.setdefault(scene.dataset, []).append(scene)
+    return tuple(scene for each in sets.values() for scene in _every_so_often(each, min(most, len(each))))
+
+
+def _every_so_often(scenes: Sequence[_Scene], count: int) -> list[_Scene]:
+    """Return so many of the scenes, evenly spread.
+
+    >>> _every_so_often("abcdef", 2)
+    ['c', 'f']
+    """
+    total = len(scenes)
+    return [scene for place, scene in enumerate(scenes) if (place + 1) * count // total > place * count // total]
+
+
 def assign_folds(names: Sequence[str], folds: int) -> tuple[int, ...]:
     """Return the fold of each scene: the smallest one so far, siblings together.
 

@@ -33,6 +33,13 @@ class MatchingSamplesParams(Params):
         "dense", description="dense: crops of many pixels and disparities; patch: the paper's single patches"
     )
     samples: int = Field(18000, ge=1, description="number of samples, the same from every scene")
+    dense_share: float | None = Field(
+        None,
+        gt=0,
+        lt=1,
+        description="share of the samples from scenes with a dense truth, where others have a sparse one; "
+        "default: the same number from every scene",
+    )
     height: int = Field(16, ge=1, le=256, description="rows of a dense crop, px")
     width: int = Field(32, ge=1, le=256, description="columns of a dense crop, px")
     slots: int = Field(12, ge=3, le=512, description="disparities at which a dense crop is compared, at most")

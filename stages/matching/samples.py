@@ -14,6 +14,7 @@ Where the right view has ground truth, half the samples are *mirrored*: both vie
 exchanged, which is again a rectified pair.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -26,6 +27,8 @@ from semidense.stages.stage import StageError, Truth, by_scene
 
 NEAR = 6
 """Largest distance from the truth, in pixels, of a mismatch that is drawn beside it."""
+DENSE = 0.5
+"""Share of known pixels above which a truth is dense; the laser scanner of KITTI gives 13 to 35 %."""
 ABSENT = np.iinfo(np.int32).min
 """Fills the slots of a sample that has fewer disparities than the others."""
 
@@ -53,7 +56,7 @@ def draw_samples(params: MatchingSamplesParams, inputs: OfTruths) -> MatchingSam
     """
     rng = np.random.default_rng(params.seed)
     scenes = [_Scene(truth, params) for truth in by_scene(inputs["truth"], "truth")]
-    order = rng.permutation(np.arange(params.samples) % len(scenes))
+    order = rng.permutation(_scene_of_sample(params, [scene.truth for scene in scenes]))
     drawn = [_draw(scenes[scene], rng) for scene in order]
     return {
         "scene": order.astype(np.int32),
@@ -63,6 +66,20 @@ def draw_samples(params: MatchingSamplesParams, inputs: OfTruths) -> MatchingSam
         "disparities": np.stack([sample.disparities for sample in drawn]),
         "truth": np.stack([sample.truth for sample in drawn]),
     }
+
+
+def _scene_of_sample(params: MatchingSamplesParams, truths: Sequence[Truth]) -> NDArray[np.int64]:
+    """Return the scene of each sample, in any order: int64 (sample,).
+
+    Without ``dense_share``, or with truths of one kind only, every scene has as many samples as the others, within one.
+    """
+    dense = np.array([np.isfinite(truth["disparity"]).mean() > DENSE for truth in truths])
+    if params.dense_share is None or dense.all() or not dense.any():
+        return np.arange(params.samples) % len(truths)
+    of_dense = round(params.samples * params.dense_share)
+    counts = (of_dense, params.samples - of_dense)
+    parts = (np.resize(np.flatnonzero(kind), count) for kind, count in zip((dense, ~dense), counts, strict=True))
+    return np.concatenate([*parts])
 
 
 @dataclass(frozen=True)

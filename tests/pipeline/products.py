@@ -140,6 +140,13 @@ def distinctiveness() -> xr.Dataset:
     return xr.Dataset({view: (("y", "x"), silent, {"long_name": f"{view} view"}) for view in ("left", "right")})
 
 
+def evidence_samples() -> xr.Dataset:
+    rng = np.random.default_rng(0)
+    features = rng.normal(size=(20, 14)).astype(np.float32)
+    error = rng.exponential(size=20).astype(np.float32)
+    return xr.Dataset({"features": (("pixel", "feature"), features), "error": ("pixel", error)})
+
+
 def cost_margin() -> xr.Dataset:
     margin = np.where(np.isnan(DISPARITY), N, 2).astype(np.float32)
     return xr.Dataset({"margin": (("y", "x"), margin, {"long_name": "margin", "units": "log-odds"})})
@@ -159,6 +166,7 @@ PRODUCTS: dict[str, Callable[[], xr.Dataset]] = {
     "evaluation_net": shipped,
     "distinctiveness": distinctiveness,
     "cost_margin": cost_margin,
+    "evidence_samples": evidence_samples,
     "evidence_net": shipped,
     "confidence": confidence,
     "evidence_confidence": confidence,

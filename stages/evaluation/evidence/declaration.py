@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import Literal, TypedDict
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from semidense.stages.compute.precision import Precision
@@ -22,10 +24,16 @@ class EvidenceNetParams(Schedule):
     peak_rate: float = Field(0.01, gt=0, description="highest learning rate")
     checkpoint_steps: int = Field(500, ge=1, description="steps between two checkpoints", exclude=True)
     batch: int = Field(4096, ge=SHARDS, multiple_of=SHARDS, description="pixels a step; a multiple of the shards")
-    pixels: int = Field(20000, ge=1, description="pixels of each training scene, drawn at random")
     tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
+    seed: int = Field(0, ge=0, description="seed of the weights")
+
+
+class EvidenceSamplesParams(Params):
+    """Which pixels of a training scene the net that weighs the evidence learns from."""
+
+    pixels: int = Field(20000, ge=1, description="pixels of each training scene, drawn at random")
     precision: Precision = Field("auto", description="arithmetic of the evaluation-Net: float32 or bfloat16")
-    seed: int = Field(0, ge=0, description="seed of the weights and of the draw")
+    seed: int = Field(0, ge=0, description="seed of the draw")
 
 
 class EvidenceConfidenceParams(Params):
@@ -45,13 +53,26 @@ class EvidenceConfidenceParams(Params):
         return ("images", "disparity", "evaluation_net", "evidence_net", *vetoing)
 
 
-class EvidentScenes(TypedDict):
-    """What the net that weighs the evidence learns from: every training scene, and the evaluation-Net."""
+class EvidentScene(TypedDict):
+    """A training scene whose pixels are drawn, and the evaluation-Net that scores them."""
 
-    images: Sequence[Images]
-    disparity: Sequence[DisparityMap]
-    truth: Sequence[Truth]
+    images: Images
+    disparity: DisparityMap
+    truth: Truth
     evaluation_net: Network
+
+
+class EvidenceSamples(TypedDict):
+    """The product ``evidence_samples``: (pixel, feature) what is known of each, (pixel,) error of its disparity, px."""
+
+    features: NDArray[np.float32]
+    error: NDArray[np.float32]
+
+
+class OfEvidenceSamples(TypedDict):
+    """What the net that weighs the evidence learns from: the drawn pixels of every training scene."""
+
+    evidence_samples: Sequence[EvidenceSamples]
 
 
 class WithEvidence(Judged):
@@ -60,9 +81,21 @@ class WithEvidence(Judged):
     evidence_net: Network
 
 
+EVIDENCE_SAMPLES = Stage(
+    product="evidence_samples",
+    inputs=("images", "disparity", "truth", "evaluation_net"),
+    outputs=(
+        Output("features", ("pixel", "feature"), "float32", "1", "what is known of each pixel: sign(v) ln(1 + |v|)"),
+        Output("error", ("pixel",), "float32", "px", "distance of the disparity from the truth"),
+    ),
+    compute="semidense.stages.evaluation.evidence.samples:draw_evidence_samples",
+    params=EvidenceSamplesParams,
+)
+"""``disparity`` brings the array ``evidence`` (feature, y, x): ``use.disparity=aggregated``."""
+
 EVIDENCE_NET = Stage(
     product="evidence_net",
-    inputs=("images", "disparity", "truth", "evaluation_net"),
+    inputs=("evidence_samples",),
     outputs=(
         Output("parameters", ("parameter",), "float32", "1", "weights of the net, and the scale of its inputs"),
         Output("loss", ("step",), "float32", "1", "cross-entropy of each training step"),
@@ -73,7 +106,6 @@ EVIDENCE_NET = Stage(
     monitored=True,
     learnt=True,
 )
-"""``disparity`` brings the array ``evidence`` (feature, y, x): ``use.disparity=aggregated``."""
 
 EVIDENCE_CONFIDENCE = Stage(
     product="evidence_confidence",

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import dask
 import numpy as np
 import pytest
 
@@ -80,8 +79,7 @@ def no_dask(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("something was computed")
 
-    monkeypatch.setattr(dask, "compute", refuse)
-    monkeypatch.setattr(dask, "delayed", refuse)
+    monkeypatch.setattr("dask.threaded.get", refuse)
     monkeypatch.setattr(Store, "begin", refuse)
     monkeypatch.setattr(Stage, "function", refuse)
 

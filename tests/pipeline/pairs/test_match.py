@@ -21,6 +21,7 @@ from semidense.pipeline.pairs.match import Match, match, match_all
 from semidense.pipeline.pairs.match_files import save, save_all
 from semidense.pipeline.pairs.wishes import Wishes
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.presets import PRESETS
 from semidense.stages.stage import StageError
 
 SCENE = "synthetic:train=0,test=1,height=64,width=80,disparities=8"
@@ -110,16 +111,18 @@ def test_the_preset_is_robust_unless_another_is_named(folder: Path, found: Match
 
 
 @pytest.mark.parametrize("wish", [{"max_error": 0.02}, {"calibrated": True}], ids=["an error", "probabilities"])
-def test_a_preset_without_a_calibration_says_so_before_anything_is_made(
+def test_maps_without_a_calibration_are_told_before_anything_is_made(
     folder: Path, tmp_path: Path, wish: dict[str, Any]
 ) -> None:
-    files = folder / "left.png", folder / "right.png"
-    with pytest.raises(StageError, match=r"no calibration of .*evidence_confidence .*take the preset paper"):
-        match(*files, d_min=0, d_max=8, cache=tmp_path / "cache", **wish)
+    files, indoor = (folder / "left.png", folder / "right.png"), {"settings": ["training.weights=indoor"]}
+    with pytest.raises(StageError, match=r"no calibration of .*evidence_confidence .*take a preset as it is"):
+        match(*files, d_min=0, d_max=8, cache=tmp_path / "cache", **indoor, **wish)
     assert not (tmp_path / "cache").exists()
     with pytest.raises(StageError, match="no calibration of"):
-        pipeline.StereoMatcher(0, 9, **wish)
-    assert match(*files, d_min=0, d_max=8, cache=folder / "cache", preset="paper", **wish).expected_error is not None
+        pipeline.StereoMatcher(0, 9, **indoor, **wish)
+    for preset in PRESETS:
+        found = match(*files, d_min=0, d_max=8, cache=folder / "cache", preset=preset, **wish)
+        assert found.expected_error is not None
 
 
 def test_a_pair_is_a_dataset_like_any_other(folder: Path, found: Match) -> None:

@@ -11,6 +11,7 @@ from semidense.pipeline.plan import shipped_weights as shipped
 from semidense.pipeline.plan.building import build
 from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.presets import PRESETS
 from semidense.pipeline.plan.steps import SPLIT, Graph, Request, Step, products
 from semidense.pipeline.plan.training_split import training_scenes
 from semidense.stages.catalog import CATALOG, READ
@@ -90,6 +91,52 @@ def test_a_training_can_rest_on_networks_that_come_with_the_package() -> None:
     assert "matching_samples" not in counts(made)
     assert find(made, "matching_net", SPLIT).settings == find(graph(), "matching_net", SPLIT).settings
     assert "shipped" not in find(made, "evaluation_net", SPLIT).settings
+
+
+def behind(made: Graph, step_id: str) -> set[str]:
+    """Return the ids of a step and of all that it is made from."""
+    inputs = (each for ids in made.steps[step_id].inputs.values() for each in ids)
+    return {step_id}.union(*(behind(made, each) for each in inputs))
+
+
+def seen_by(made: Graph, net: str) -> set[str]:
+    """Return the scenes whose truth a network has learnt from."""
+    return {made.steps[each].scene for each in behind(made, net) if made.steps[each].product == "truth"}
+
+
+@pytest.mark.parametrize("upto", ["evidence_net", "calibration"])
+def test_cross_fitted_maps_are_by_networks_that_have_not_seen_the_scene(upto: str) -> None:
+    made = graph(*PRESETS["robust"], upto=upto, train=True)
+    drawn = [step for step in made.steps.values() if step.product == "evidence_samples"]
+    assert {step.scene for step in drawn} == {"train-0", "train-1"}
+    for step in drawn:
+        (costs,) = made.steps[step.inputs["disparity"][0]].inputs["costvolume"]
+        assert seen_by(made, made.steps[costs].inputs["descriptor_net"][0]) == {"train-0", "train-1"} - {step.scene}
+        (net,) = step.inputs["evaluation_net"]
+        assert {made.steps[each].scene for each in made.steps[net].inputs["images"]}.isdisjoint({step.scene})
+
+
+def test_the_maps_that_are_learnt_from_can_be_fewer_than_the_scenes_of_the_costs() -> None:
+    many = open_dataset("synthetic:train=6,test=1,height=64,width=80,disparities=8")
+    made = graph("training.maps=2", "training.cross_fit=true", upto="calibration", train=True, dataset=many)
+    names = {step.scene for step in made.steps.values() if step.product == "disparity"}
+    assert names == {"train-2", "train-5"}
+    ((target, _),) = made.targets
+    assert made.steps[target].settings["fold_of_scene"] == [0, 1]
+    learnt = {step.scene for step in made.steps.values() if step.product == "channels"}
+    assert learnt == {f"train-{number}" for number in range(6)}
+
+
+def test_a_calibration_takes_the_cross_fitted_maps_of_the_evidence() -> None:
+    made = graph(*PRESETS["robust"], upto="calibration", train=True)
+    ((target, _),) = made.targets
+    samples = {step.scene: step for step in made.steps.values() if step.product == "evidence_samples"}
+    for scored, shown in zip(*(made.steps[target].inputs[each] for each in ("confidence", "disparity")), strict=True):
+        step = made.steps[scored]
+        assert step.inputs["disparity"] == (shown,) == samples[step.scene].inputs["disparity"]
+        net = made.steps[step.inputs["evidence_net"][0]]
+        learnt = {made.steps[each].scene for each in net.inputs["evidence_samples"]}
+        assert learnt == {"train-0", "train-1"} - {step.scene}
 
 
 @pytest.mark.parametrize(("mode", "ending"), [("exact", ""), ("guided", ".guided"), ("fast", "")])

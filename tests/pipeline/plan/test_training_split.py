@@ -1,8 +1,11 @@
+from dataclasses import replace
+
 import pytest
 
+from semidense.datasets import open_dataset
 from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.errors import UsageError
-from semidense.pipeline.plan.training_split import assign_folds, outside, with_folds
+from semidense.pipeline.plan.training_split import assign_folds, outside, spread, with_folds
 
 NAMES = ["2006/Art", "2006/Cloth1", "2006/Cloth2", "2006/Dolls", "2006/Wood1"]
 
@@ -31,6 +34,14 @@ def test_a_network_sees_the_other_folds_only() -> None:
     for fold in (0, 1):
         seen = outside(NAMES, folds, fold)
         assert {folds[NAMES.index(name)] for name in seen} == {1 - fold}
+
+
+def test_maps_are_of_at_most_so_many_scenes_of_each_data_set() -> None:
+    scenes = open_dataset("synthetic:train=7,test=2").scenes
+    both = (*scenes, *(replace(scene, dataset="other") for scene in scenes[:2]))
+    chosen = [(scene.name, scene.dataset) for scene in spread(both, 3)]
+    assert chosen == [(both[at].name, both[at].dataset) for at in (2, 5, 8, 9, 10)]
+    assert spread(both, None) == spread(both, 100) == both
 
 
 def test_the_configuration_gets_the_folds() -> None:

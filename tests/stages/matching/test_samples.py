@@ -55,6 +55,22 @@ def test_a_seed_gives_one_draw_and_another_seed_another(form: str) -> None:
     assert not same(one, other)
 
 
+def test_a_share_of_the_samples_is_of_dense_truths() -> None:
+    dense, sparse = shifted_scene(), shifted_scene()
+    known = np.random.default_rng(0).random(sparse["truth"]["disparity"].shape) < 0.2
+    sparse["truth"] = sparse["truth"] | {"disparity": np.where(known, sparse["truth"]["disparity"], np.float32(N))}
+    sparse["truth"]["nonocc"] = sparse["truth"]["nonocc"] & known
+    given = truths(sparse, dense, sparse)
+    counts = {
+        share: np.bincount(draw_samples(MatchingSamplesParams(dense_share=share, **SMALL), given)["scene"]).tolist()
+        for share in (None, 0.5, 0.7)
+    }
+    assert counts == {None: [20, 20, 20], 0.5: [15, 30, 15], 0.7: [9, 42, 9]}
+    alike = MatchingSamplesParams(dense_share=0.9, **SMALL), MatchingSamplesParams(**SMALL)
+    for kind in (dense, sparse):  # with truths of one kind there is nothing to balance
+        assert same(*(draw_samples(params, truths(kind, kind)) for params in alike))
+
+
 @forms
 def test_crops_are_those_of_the_visible_truth(form: str) -> None:
     scene = shifted_scene()

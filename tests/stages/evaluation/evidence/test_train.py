@@ -3,25 +3,30 @@ import pytest
 
 from semidense.stages.disparity.evidence import FEATURES
 from semidense.stages.evaluation.evidence.confidence import weigh
-from semidense.stages.evaluation.evidence.declaration import EVIDENCE_NET, EvidenceNetParams
+from semidense.stages.evaluation.evidence.declaration import EVIDENCE_NET, EvidenceNetParams, EvidenceSamplesParams
 from semidense.stages.evaluation.evidence.features import of_whole_map
+from semidense.stages.evaluation.evidence.samples import draw_evidence_samples
 from semidense.stages.evaluation.evidence.train import train_evidence_net
 from tests.stages.evaluation.evidence.test_confidence import products
 from tests.stages.monitors import InterruptedTrainingError, Memory
 
-PARAMS = EvidenceNetParams(steps=60, batch=64, pixels=200, precision="float32", checkpoint_steps=20)
+PARAMS = EvidenceNetParams(steps=60, batch=64, checkpoint_steps=20)
 
 
 def training(count: int = 2) -> dict[str, object]:
-    """Scenes of which a disparity is right where the aggregated margin is large, and only there."""
+    """Samples of scenes of which a disparity is right where the aggregated margin is large, and only there."""
+    drawn = EvidenceSamplesParams(pixels=200, precision="float32")
+    return {"evidence_samples": [draw_evidence_samples(drawn, scene) for scene in evident_scenes(count)]}
+
+
+def evident_scenes(count: int = 2) -> list[dict[str, dict]]:
     scenes = [products(height=20, width=24) for _ in range(count)]
     for number, given in enumerate(scenes):
         margin = np.random.default_rng(number).uniform(0, 30, (20, 24)).astype(np.float16)
         given["disparity"]["evidence"][FEATURES.index("aggregated_margin")] = margin
         given["truth"] = {"disparity": given["disparity"]["disparity"] + np.where(margin > 8, 0, 5).astype(np.float32)}
         given["truth"]["disparity"][:3] = np.nan
-    lists = {name: [given[name] for given in scenes] for name in ("images", "disparity", "truth")}
-    return {**lists, "evaluation_net": scenes[0]["evaluation_net"]}
+    return scenes
 
 
 def test_makes_what_it_declares_and_one_seed_makes_it_again() -> None:
@@ -34,10 +39,9 @@ def test_makes_what_it_declares_and_one_seed_makes_it_again() -> None:
 
 
 def test_it_learns_which_evidence_tells_right_from_wrong() -> None:
-    given = training()
-    made = train_evidence_net(PARAMS.model_copy(update={"steps": 300}), given)
-    scene = {name: given[name][0] for name in ("images", "disparity", "truth")}
-    known = of_whole_map(scene["images"], scene["disparity"], given["evaluation_net"], "float32")
+    made = train_evidence_net(PARAMS.model_copy(update={"steps": 300}), training())
+    scene = evident_scenes()[0]
+    known = of_whole_map(scene["images"], scene["disparity"], scene["evaluation_net"], "float32")
     right = scene["disparity"]["evidence"][FEATURES.index("aggregated_margin")] > 8
     odds = weigh(made["parameters"], known.stacked)
     assert np.mean((odds > 0) == right) > 0.95
