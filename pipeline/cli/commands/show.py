@@ -12,6 +12,7 @@ from semidense.pipeline.cli.options import (
     CacheOption,
     ConfigOption,
     DatasetArgument,
+    JsonOption,
     ModeOption,
     PresetOption,
     SceneOption,
