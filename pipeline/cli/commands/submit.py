@@ -16,9 +16,9 @@ from semidense.pipeline.cli.options import (
     SetOption,
     WorkersOption,
     chosen,
+    chosen_preset,
     config_file,
 )
-from semidense.pipeline.plan.presets import DEFAULT
 
 if TYPE_CHECKING:
     from semidense.datasets import SceneSource
@@ -50,7 +50,7 @@ def submit(
     ] = False,
     scene: SceneOption = None,
     settings: SetOption = None,
-    preset: PresetOption = DEFAULT,
+    preset: PresetOption = None,
     mode: ModeOption = None,
     config: ConfigOption = None,
     workers: WorkersOption = None,
@@ -68,7 +68,8 @@ def submit(
 
     layout = layout_of(benchmark)
     forms = forms_of(layout, form)
-    task = api.Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, preset)
+    named = chosen_preset(preset, config)
+    task = api.Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, named)
     scenes = task.open().scenes
     lacks = require_complete(layout, scenes, partial)
     with ProgressWatch(console.announce) as watch:
