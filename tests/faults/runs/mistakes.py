@@ -41,7 +41,7 @@ COMMANDS = (
     "{run} match {pipe} {pipe} -o {folder}",
     "{run} status {spec} --cache /proc",
     "ulimit -v 600000; {run} run {spec} --upto disparity",
-    "ulimit -n 14; {run} run {spec} --upto images",
+    "ulimit -n 8; {run} run {spec} --upto images",
 )
 """Commands that must end with one line and exit code 2."""
 
