@@ -14,6 +14,7 @@ from benchmarks import (
     aggregation,
     agreement,
     cost_volume,
+    domains,
     growth,
     low_rank,
     many_scenes,
@@ -99,6 +100,37 @@ def test_the_matchers_are_told_with_their_errors_and_drawn(tmp_path: Path, capsy
     found = json.loads((tmp_path / "build" / "bench" / "matchers.json").read_text())["matchers"]
     assert all(0 <= each["raw_bad"] <= 100 and each["seconds"] > 0 for each in found.values())
     assert (tmp_path / "p.png").stat().st_size > 1000
+
+
+def test_worlds_stand_beside_each_other(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("cv2", reason="needs the extra baselines")
+    domains.main([TINY], setting=["semidense.R=0.9"], cache=tmp_path / "cache")
+    assert "a wanted error" in capsys.readouterr().out
+    found = json.loads((tmp_path / "build" / "bench" / "domains.json").read_text())["datasets"][TINY]
+    assert found["scenes"] == 1 and 0 <= found["dense >1"] <= 100
+    assert found["dense >1"] >= found["dense >2"] >= found["dense >3"]
+
+
+def test_shares_of_wrong_pixels_by_hand() -> None:
+    """Five pixels, of which the last does not count; SGBM keeps two of the four, one of them wrong."""
+    row = np.float32([[10, 10, 10, 10, 10]])
+    score = np.float32([[0.95, 0.92, 0.5, 0.1, 1.0]])
+    maps = domains._Maps(
+        truth=row, mask=np.array([[True, True, True, True, False]]), own=row + np.float32([[0, 1.5, 0, 9, 9]]),
+        sgm=row + np.float32([[np.nan, 0, 5, np.nan, 0]]), sgm_dense=row + np.float32([[5, 0, 5, 0, 0]]),
+        score=score, chance=score,
+    )  # fmt: skip
+    shares = domains._shares(maps, score >= np.float32(0.9), domains.Ranking.of(score[maps.mask]), 1.0)
+    assert [*shares.values()] == [50, 50, 50, 50, 50]
+    shares = domains._shares(maps, score >= np.float32(0.9), domains.Ranking.of(score[maps.mask]), 2.0)
+    assert [*shares.values()] == [25, 50, 0, 50, 0]
+    # A mean doubt of (0 + 0.05 + 0.08) / 3 is within 5 %: three pixels are kept, two of them count.
+    assert domains._promised(maps, 0.05)["0.05 kept"] == 50
+    assert domains._promised(maps, 0.05)["0.05 wrong > 1 px"] == 50
+    # 0.95 and 0.92 share a bin with one right pixel; 0.5 is right and 0.1 is wrong, each in a bin of its own.
+    right = np.array([True, False, True, False])
+    expected = (abs(0.95 + 0.92 - 1) + 0.5 + 0.1) / 4
+    assert domains._calibration_error(score[maps.mask], right) == pytest.approx(expected, abs=1e-6)
 
 
 def test_the_choice_of_the_agreement_is_a_table(

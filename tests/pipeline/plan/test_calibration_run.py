@@ -17,6 +17,7 @@ from semidense.pipeline.pages.report.graph import graph
 from semidense.pipeline.pairs.match import match, match_all
 from semidense.pipeline.pairs.wishes import Wishes
 from semidense.pipeline.plan import shipped_weights as shipped
+from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.result import Result
 from semidense.stages.evaluation.calibration.declaration import BINS
@@ -197,6 +198,20 @@ def test_the_command_says_what_the_threshold_rests_on(
 def test_the_bins_are_wide_enough_for_both_ends() -> None:
     assert probability(EDGES[[0, -1]]).round(5).tolist() == [5e-05, 0.99995]
     assert EDGES.size == BINS + 1
+
+
+def test_the_general_weights_were_made_by_the_recipe_of_the_preset() -> None:
+    config = Config.load(preset="robust").to_dict()
+    for product in ("descriptor_net", "evaluation_net", "evidence_net", "calibration"):
+        file = shipped.weights_file(shipped.weights_of(Config.load(preset="robust"), product).name)
+        with safe_open(str(file), "numpy") as opened:
+            made = json.loads(opened.metadata()["configuration"])
+        assert set(made) >= {product, "matching_samples"}
+        for section in made.keys() & {"matching_samples", "evaluation_samples", "evidence_samples"}:
+            open_ends = {"tiles": None, "precision": None}
+            assert made[section] | open_ends == config[section] | open_ends
+        if product != "calibration":
+            assert made[product]["steps"] == config[product]["steps"]
 
 
 @pytest.mark.parametrize("mode", ["exact", "guided"])

@@ -22,7 +22,7 @@ def test_missing_weights_say_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
 
 def test_a_calibration_is_of_one_confidence_alone() -> None:
-    with pytest.raises(StageError, match=r"no calibration of evidence_confidence comes .* give R or a density instead"):
+    with pytest.raises(StageError, match=r"evidence_confidence and fast comes .* give R or a density instead"):
         shipped.shipped_weights("calibration", "fast", "evidence_confidence")
 
 
