@@ -64,7 +64,7 @@ def confidence_scale() -> Scale:
     """Return the scale of confidence maps: log-odds, so that the middle can be seen."""
     low, high = CONFIDENCE_TICKS[0], CONFIDENCE_TICKS[-1]
     places = confidence_share, confidence_at
-    return Scale(confidence_colours(), low, high, "confidence (0 to 1, scale of log-odds)", CONFIDENCE_TICKS, places)
+    return Scale(confidence_colours(), low, high, "confidence (0 to 1)", CONFIDENCE_TICKS, places)
 
 
 def disparity_scale(disparity: NDArray[Any], label: str = "disparity (px)") -> Scale:
