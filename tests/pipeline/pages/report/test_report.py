@@ -17,6 +17,8 @@ from semidense.pipeline.results.result import Result
 from tests.tiny import SPEC, TEST_ONLY, TRAINED
 
 Invoke = Callable[..., Any]
+PARTS = ["What ran", "Networks", "Settings, versions and keys"]
+"""What is closed at the end of a report."""
 
 
 @pytest.fixture(scope="session")
@@ -32,11 +34,8 @@ def test_it_has_every_part(page: str) -> None:
     assert headings(page) == [
         *("Pictures", "Figures", "Error against invalid pixels", "Confidence", "How it was made"),
     ]
-    assert re.findall(r"<summary>(.*?)</summary>", page)[-4:-1] == [
-        "What ran",
-        "Networks",
-        "Settings, versions and keys",
-    ]
+    closed = [each for each in re.findall(r"<summary>(.*?)</summary>", page) if each in PARTS]
+    assert closed == PARTS
 
 
 def test_nothing_is_loaded_from_anywhere(page: str) -> None:
@@ -90,7 +89,8 @@ def test_the_settings_are_told(trained_task: Task, tmp_path: Path) -> None:
     page = report(
         replace(trained_task, settings=[*trained_task.settings, "semidense.R=0.9"]), tmp_path / "r"
     ).read_text()
-    assert "--preset paper --set semidense.R=0.9" in page
+    assert "--preset paper" in page
+    assert "--set semidense.R=0.9" in page
 
 
 def test_nothing_cached_is_one_line_and_no_file(invoke: Invoke, tmp_path: Path) -> None:
