@@ -17,6 +17,8 @@ from semidense.stages.catalog import STAGES
 from semidense.stages.stage import NoParams, Stage
 
 ROOT = Path(__file__).parents[1]
+_BOUNDS = (("ge", "at least"), ("gt", "above"), ("le", "at most"), ("lt", "below"), ("min_length", "values, at least"))
+"""Limits of a field, and how they are written."""
 ROOT_PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 """Files of the root, and what they are called on the site."""
 
@@ -66,16 +68,18 @@ def settings() -> str:
     lines = ["# Settings", "", "Give them as `--set section.field=value`, or in a TOML file with `--config`."]
     for name, stage in STAGES.items():
         if stage.params is not NoParams:
-            rows = [_setting(name, *each) for each in stage.params.model_fields.items()]
+            rows = [_setting(*each) for each in stage.params.model_fields.items()]
             about = (stage.params.__doc__ or "").split("\n")[0]
             lines += ["", f"## {name}", "", about, "", *_table(("setting", "default", "range", "meaning"), rows)]
     return "\n".join(lines)
 
 
-def _setting(section: str, name: str, field: FieldInfo) -> tuple[str, ...]:
+def _setting(name: str, field: FieldInfo) -> tuple[str, ...]:
     default = json.dumps(field.get_default(call_default_factory=True), default=str)
-    limits = ", ".join(str(each) for each in field.metadata if "Validator" not in str(each)) or _choices(field)
-    return f"`{section}.{name}`", f"`{default}`", limits, field.description or ""
+    limits = [
+        f"{words} {getattr(each, bound)}" for each in field.metadata for bound, words in _BOUNDS if hasattr(each, bound)
+    ]
+    return f"`{name}`", f"`{default}`", ", ".join(limits) or _choices(field), field.description or ""
 
 
 def _choices(field: FieldInfo) -> str:
@@ -88,7 +92,14 @@ def products() -> str:
     about = "`--upto NAME` stops at a product; `Result.open(NAME)` and `pipeline inspect NAME` show one."
     lines = ["# Products", "", about]
     for name, stage in STAGES.items():
-        lines += ["", f"## {name}", "", _inputs(stage), "", *_table(("array", "dims", "dtype", "unit", "what it is"), _arrays(stage))]
+        lines += [
+            "",
+            f"## {name}",
+            "",
+            _inputs(stage),
+            "",
+            *_table(("array", "dims", "dtype", "unit", "what it is"), _arrays(stage)),
+        ]
     return "\n".join(lines)
 
 
