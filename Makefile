@@ -82,7 +82,7 @@ silence: $(READY)  ## paint 200 regions without information into a real pair: at
 
 wheel: $(READY)  ## build the wheel and the source distribution, and check both
 	rm -rf dist
-	$(BIN)/python -m build --outdir dist .
+	$(BIN)/python -m build --no-isolation --outdir dist .
 	$(BIN)/twine check --strict dist/*
 	$(BIN)/check-wheel-contents dist/*.whl
 
