@@ -80,8 +80,9 @@ def confidence_share(confidence: NDArray[Any]) -> NDArray[Any]:
 def confidence_at(share: NDArray[Any]) -> NDArray[Any]:
     """Return the confidence at a place of the scale: the inverse of ``confidence_share``."""
     low, high = CONFIDENCE_TICKS[0], CONFIDENCE_TICKS[-1]
-    odds: NDArray[Any] = (high / low) ** (2 * share - 1)
-    return odds / (1 + odds)
+    odds = (high / low) ** (2 * share - 1)
+    confidence: NDArray[Any] = odds / (1 + odds)
+    return confidence
 
 
 @cache

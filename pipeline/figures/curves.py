@@ -66,7 +66,7 @@ def error_curve_figure(
         dots = "." if len(curve) <= _DOTS else None
         _draw(axes, curve, name, color=colour, linestyle=dash, linewidth=1.4, marker=dots)
     _draw_means(axes, chosen, marked)
-    draw_matchers(axes, [row | {"method": f"{row['method']} (other matcher)"} for row in others])
+    draw_matchers(axes, [{**row, "method": f"{row['method']} (other matcher)"} for row in others])
     _label(axes, mask, threshold)
     _legend(figure, axes)
     return figure

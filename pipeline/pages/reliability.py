@@ -60,7 +60,9 @@ def reliability(tallies: list[Tally], mask: str = "all", threshold: float = 1.0)
 def _tenths(tallies: list[Tally], scenes: list[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return sums over the bins of tallies as sums over tenths and scenes; a confidence of 1 belongs to the last."""
     places = [np.minimum((each.Rs * _BINS + _ROUNDING).astype(int), _BINS - 1) for each in tallies]
-    return np.sum([np.bincount(*each, _BINS) for each in zip(places, scenes, strict=True)], axis=0)
+    tenths = [np.bincount(*each, _BINS) for each in zip(places, scenes, strict=True)]
+    total: NDArray[np.float64] = np.sum(tenths, axis=0)
+    return total
 
 
 def reliability_figure(found: Reliability, *, title: str, mask: str = "all", threshold: float = 1.0) -> Figure:
