@@ -64,8 +64,15 @@ def handmade(
     truth[random.random(truth.shape) < 0.05] = np.nan
     view = random.integers(0, 256, (height, width, 3), np.uint8)
     made = Handmade(Store(folder), {}, {}, scene)
-    made.write("images", {}, (), left=view, right=view[:, ::-1].copy(), moments=np.zeros((2, 2)))
-    made.write("truth", {}, (), disparity=truth, nonocc=np.isfinite(truth) & (x > 4), mask_kind=np.array([3], np.int8))
+    made.write("images", {"seed": seed}, (), left=view, right=view[:, ::-1].copy(), moments=np.zeros((2, 2)))
+    made.write(
+        "truth",
+        {"seed": seed},
+        (),
+        disparity=truth,
+        nonocc=np.isfinite(truth) & (x > 4),
+        mask_kind=np.array([3], np.int8),
+    )
     channels = random.random((2, 3, height, width)).astype(np.float32)
     made.write("channels", {"use": ["gray", "rank", "companion"]}, ("images",), channels=channels)
     made.write("costvolume", {"d_min": 0}, ("channels",), cost=cost, d=d)
