@@ -9,7 +9,7 @@ ifeq ($(filter exact guided,$(MODE)),)
 $(error MODE=$(MODE): the weights that come with the package are of exact and of guided volumes)
 endif
 
-.PHONY: demo test lint train descriptors evaluation evidence calibration train-general bench faults silence wheel clean
+.PHONY: demo test lint docs train descriptors evaluation evidence calibration train-general bench faults silence wheel clean
 
 demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
 	$(BIN)/pipeline run motorcycle --output demo
@@ -24,6 +24,9 @@ lint: $(READY)  ## style, types, and who may import whom
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs: $(READY)  ## build the documentation site into build/site; a link that leads nowhere is an error
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 train: $(READY)  ## DATA=DIR: train both networks on DIR/2001, 2003, 2005 and 2006, and put the weights in place
 	@test -n "$(DATA)" || { echo "make train: say where the Middlebury sets are: make train DATA=DIR"; exit 2; }
@@ -77,13 +80,16 @@ faults: $(READY)  ## inject every fault of the matrix, and put the outcome where
 silence: $(READY)  ## paint 200 regions without information into a real pair: at most 1 % of each may be kept
 	SILENCE_DRAWS=200 $(BIN)/python -m pytest tests/system/test_silence.py
 
-wheel: $(READY)
-	$(BIN)/python -m pip wheel --no-deps --wheel-dir dist .
+wheel: $(READY)  ## build the wheel and the source distribution, and check both
+	rm -rf dist
+	$(BIN)/python -m build --no-isolation --outdir dist .
+	$(BIN)/twine check --strict dist/*
+	$(BIN)/check-wheel-contents dist/*.whl
 
 clean:
 	rm -rf .venv build dist demo *.egg-info
 
 $(READY): pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,docs]'
 	@touch $@

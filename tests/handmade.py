@@ -48,7 +48,9 @@ class Handmade:
         self.entries[product] = self.store.require(recipe.key)
 
 
-def handmade(folder: Path, height: int = 60, width: int = 90, disparities: int = 12, seed: int = 0) -> Handmade:
+def handmade(
+    folder: Path, height: int = 60, width: int = 90, disparities: int = 12, seed: int = 0, scene: str = "Hand"
+) -> Handmade:
     """Write a scene whose costs have one clear valley a pixel, which is the truth in three of four cases."""
     random = np.random.default_rng(seed)
     y, x = np.mgrid[0:height, 0:width]
@@ -61,9 +63,16 @@ def handmade(folder: Path, height: int = 60, width: int = 90, disparities: int =
     confidence = np.clip(0.5 * right + 0.5 * random.random((height, width)), 0, 1).astype(np.float32)
     truth[random.random(truth.shape) < 0.05] = np.nan
     view = random.integers(0, 256, (height, width, 3), np.uint8)
-    made = Handmade(Store(folder), {}, {})
-    made.write("images", {}, (), left=view, right=view[:, ::-1].copy(), moments=np.zeros((2, 2)))
-    made.write("truth", {}, (), disparity=truth, nonocc=np.isfinite(truth) & (x > 4), mask_kind=np.array([3], np.int8))
+    made = Handmade(Store(folder), {}, {}, scene)
+    made.write("images", {"seed": seed}, (), left=view, right=view[:, ::-1].copy(), moments=np.zeros((2, 2)))
+    made.write(
+        "truth",
+        {"seed": seed},
+        (),
+        disparity=truth,
+        nonocc=np.isfinite(truth) & (x > 4),
+        mask_kind=np.array([3], np.int8),
+    )
     channels = random.random((2, 3, height, width)).astype(np.float32)
     made.write("channels", {"use": ["gray", "rank", "companion"]}, ("images",), channels=channels)
     made.write("costvolume", {"d_min": 0}, ("channels",), cost=cost, d=d)

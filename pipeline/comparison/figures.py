@@ -1,6 +1,7 @@
 """Draw a comparison: a dot for each scene and method, and error against invalid pixels."""
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from semidense.pipeline.results.metric_rows import FIGURES, METHOD, Row, mean_na
 from semidense.stages.stage import Array, Arrays
 from semidense.stages.transforms.gray import to_gray
 
+_LETTERS = 7
+"""Letters of an axis label in an inch of the figure, beside the names of the methods."""
 _MARKED = (0.0, 0.5, 0.9, 0.99)
 """Values of R that are written beside the curve."""
 
@@ -31,20 +34,28 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 
         title: stands above.
         width: of the figure, inches.
     """
-    over = mean_name(len({row["scene"] for row in rows}))
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    over = mean_name(len(scenes))
     means = {row["method"]: row if row["scene"] == over else {} for row in mean_rows(rows)}
     drawn = new_figure(title)
     drawn.set_size_inches(width, 1.8 + 0.45 * len(means))
     axes = drawn.subplots()
-    axes.barh(list(means), [row.get(figure, 0) for row in means.values()], color=QUIET, label=over)
-    for method in means:
+    axes.barh(
+        list(means),
+        [row.get(figure, 0) for row in means.values()],
+        color=QUIET,
+        label=over if len(scenes) > 1 else scenes[0],
+    )
+    for method in means if len(scenes) > 1 else ():
         values = [row[figure] for row in rows if row["method"] == method and figure in row]
         axes.plot(values, [method] * len(values), "o", color=BLUE, markersize=4, label="a scene")
     optimal = next(iter(means.values())).get("auc_optimal")
     if optimal is not None:
-        axes.axvline(optimal, color=RED, linestyle="--", label="mean of the optimal area")
+        axes.axvline(optimal, color=RED, linestyle="--", label="area of a perfect order")
     axes.invert_yaxis()
-    axes.set(xlabel=f"{FIGURES[figure].meaning} ({FIGURES[figure].unit})", xlim=(0, None))
+    shown = FIGURES[figure]
+    unit = "" if shown.unit == "1" else f" ({shown.unit})"
+    axes.set(xlabel=fill(shown.meaning + unit, int(_LETTERS * width)), xlim=(0, None))
     axes.grid(axis="x", alpha=0.3)
     handles, labels = axes.get_legend_handles_labels()
     drawn.legend(*_first_of_each(handles, labels), loc="outside lower center", ncols=3, frameon=False)

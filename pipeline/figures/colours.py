@@ -54,8 +54,35 @@ def disparity_colours() -> Colormap:
 
 @cache
 def confidence_colours() -> Colormap:
-    """Return the colours of confidences, different from those of disparities: sure is yellow, missing is black."""
+    """Return the colours of ``confidence_share``, different from a disparity's: sure is yellow, missing is black."""
     return _part("cividis", 0.15, 1)
+
+
+CONFIDENCE_TICKS = (0.01, 0.1, 0.5, 0.9, 0.99)
+"""Confidences that are written beside a scale; the first and the last are its ends."""
+
+
+def confidence_share(confidence: NDArray[Any]) -> NDArray[Any]:
+    """Return where confidences lie on the scale of colours: their log-odds from 0.01 to 0.99, as 0 to 1; NaN stays.
+
+    Most confidences are near 0 or 1. On a straight scale they would have two colours, and those between would be hard
+    to find.
+
+    >>> confidence_share(np.array([0, 0.01, 0.5, 0.9, 1])).round(2).tolist()
+    [0.0, 0.0, 0.5, 0.74, 1.0]
+    """
+    low, high = CONFIDENCE_TICKS[0], CONFIDENCE_TICKS[-1]
+    known = np.clip(confidence, low, high)
+    share: NDArray[Any] = 0.5 + np.log(known / (1 - known)) / (2 * np.log(high / low))
+    return share
+
+
+def confidence_at(share: NDArray[Any]) -> NDArray[Any]:
+    """Return the confidence at a place of the scale: the inverse of ``confidence_share``."""
+    low, high = CONFIDENCE_TICKS[0], CONFIDENCE_TICKS[-1]
+    odds = (high / low) ** (2 * share - 1)
+    confidence: NDArray[Any] = odds / (1 + odds)
+    return confidence
 
 
 @cache
@@ -89,12 +116,12 @@ def disparity_rgb(disparity: NDArray[Any], vmin: float, vmax: float) -> NDArray[
 
 
 def confidence_rgb(confidence: NDArray[Any]) -> NDArray[np.uint8]:
-    """Return a confidence map (y, x) in [0, 1] in colours: (y, x, 3) uint8 RGB, black where it is NaN.
+    """Return a confidence map (y, x) in [0, 1] in colours of its log-odds: (y, x, 3) uint8 RGB, black where it is NaN.
 
     Raises:
         UsageError: if the map is not (y, x).
     """
-    return _rgb(confidence, 0, 1, confidence_colours())
+    return _rgb(confidence_share(confidence), 0, 1, confidence_colours())
 
 
 def _rgb(values: NDArray[Any], vmin: float, vmax: float, colours: Colormap) -> NDArray[np.uint8]:

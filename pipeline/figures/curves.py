@@ -17,6 +17,10 @@ Curve = dict[float, tuple[float, float]]
 """R -> (invalid, bad), both in percent."""
 _MARKED = 5
 """Values of R that are written beside a curve, at most."""
+_DOTS = 25
+"""Points of a curve that are drawn as dots, at most: more make a band."""
+_COLUMNS = 64
+"""Characters in a line of the legend."""
 _DASHES = ("-", "--", ":", "-.")
 _MARKERS = "sD^vPX*"
 
@@ -28,6 +32,7 @@ def error_curve_figure(
     mask: str = "nonocc",
     threshold: float = 1.0,
     others: Sequence[Row] = (),
+    marked: Sequence[float] | None = None,
 ) -> Figure:
     """Return the curve of error against invalid pixels as R grows, a line a scene, and their mean.
 
@@ -38,6 +43,7 @@ def error_curve_figure(
         mask: ``nonocc`` or ``all``.
         threshold: px, error above which a pixel is wrong.
         others: a row a matcher that becomes a point, with ``method``, ``invalid`` and ``bad`` over the same scenes.
+        marked: values of R that are written beside the curve; None takes a few that are spread evenly.
 
     Returns:
         A figure: x is the percentage of invalid pixels, y the percentage of wrong ones among the reported. The
@@ -52,15 +58,17 @@ def error_curve_figure(
     if not drawn:
         raise UsageError(f"no row has an R, the mask {mask} and the threshold {threshold:g} px: nothing to draw")
     figure = new_figure(title)
-    figure.set_size_inches(9.5, 6)
+    figure.set_size_inches(6.2, 5.6)
     axes = figure.subplots()
     styles = cycle([(colour, dash) for dash in _DASHES for colour in LINES])
     for name, curve in drawn.items():
         colour, dash = next(styles)
-        _draw(axes, curve, name, color=colour, linestyle=dash, linewidth=1.2, marker=".")
-    _draw_means(axes, chosen)
-    draw_matchers(axes, others)
+        dots = "." if len(curve) <= _DOTS else None
+        _draw(axes, curve, name, color=colour, linestyle=dash, linewidth=1.4, marker=dots)
+    _draw_means(axes, chosen, marked)
+    draw_matchers(axes, [{**row, "method": f"{row['method']} (other matcher)"} for row in others])
     _label(axes, mask, threshold)
+    _legend(figure, axes)
     return figure
 
 
@@ -88,16 +96,16 @@ def _named(what: str, row: Row) -> str:
     return f"{what}, {family}" if (family := _family(row)) else what
 
 
-def _draw_means(axes: Axes, rows: Iterable[Row]) -> None:
+def _draw_means(axes: Axes, rows: Iterable[Row], marked: Sequence[float] | None) -> None:
     """Draw the mean of each family of several scenes, and write R beside it, or beside a family's only curve."""
     for dash, family in zip(cycle(_DASHES), _by(rows, _family).values(), strict=False):
         scenes = len({row["scene"] for row in family})
         over = mean_name(scenes)
         mean = _points(row for row in mean_rows(family) if row["scene"] == over)
         if scenes > 1 and mean:
-            style = {"color": "black", "linestyle": dash, "linewidth": 2.6, "marker": "o", "markersize": 4}
+            style = {"color": "black", "linestyle": dash, "linewidth": 2.6}
             _draw(axes, mean, _named(f"{over} scenes", family[0]), **style)
-        _write_thresholds(axes, mean)
+        _write_thresholds(axes, mean, _spread(mean) if marked is None else [R for R in marked if R in mean])
 
 
 def _draw(axes: Axes, curve: Curve, label: str, **style: Any) -> None:  # noqa: ANN401
@@ -106,19 +114,22 @@ def _draw(axes: Axes, curve: Curve, label: str, **style: Any) -> None:  # noqa: 
     line.set_label(label)
 
 
-def _write_thresholds(axes: Axes, curve: Curve) -> None:
-    """Write a few values of R beside a curve, the first and the last among them."""
+def _spread(curve: Curve) -> list[float]:
+    """Return a few values of R, the first and the last among them."""
     thresholds = list(curve)
-    for index in np.unique(np.linspace(0, len(thresholds) - 1, min(_MARKED, len(thresholds))).round().astype(int)):
-        R = thresholds[index]
-        place: dict[str, Any] = {
-            "xytext": (6, 8),
-            "textcoords": "offset points",
-            "fontsize": "small",
-            "fontweight": "bold",
-        }
-        box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
-        axes.annotate(f"R = {R:g}", curve[R], bbox=box, zorder=5, **place)
+    places = np.linspace(0, len(thresholds) - 1, min(_MARKED, len(thresholds)))
+    return [thresholds[index] for index in np.unique(places.round().astype(int))]
+
+
+def _write_thresholds(axes: Axes, curve: Curve, thresholds: Iterable[float]) -> None:
+    """Mark values of R on a curve, and write them beside it: to the left of it in the right half of the axes."""
+    box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
+    for R in thresholds:
+        at_left = curve[R][0] > 50
+        style: dict[str, Any] = {"textcoords": "offset points", "fontsize": "small", "fontweight": "bold"}
+        style |= {"xytext": (-6 if at_left else 6, 8), "ha": "right" if at_left else "left"}
+        axes.scatter(*curve[R], color="black", s=22, zorder=4)
+        axes.annotate(f"R = {R:g}", curve[R], bbox=box, zorder=5, **style)
 
 
 def draw_matchers(axes: Axes, means: Iterable[Row]) -> None:
@@ -135,12 +146,18 @@ def draw_matchers(axes: Axes, means: Iterable[Row]) -> None:
 
 
 def _label(axes: Axes, mask: str, threshold: float) -> None:
-    axes.set_xlabel(f"invalid: {mask} pixels without a disparity (%)")
-    axes.set_ylabel(f"bad: reported {mask} pixels off by more than {threshold:g} px (%)")
+    axes.set_xlabel(f"invalid: {mask} pixels that are not kept (%)")
+    axes.set_ylabel(f"bad: kept {mask} pixels off by more than {threshold:g} px (%)")
+    axes.margins(x=0.04, y=0.1)  # room for what is written beside the curve
     axes.set_ylim(bottom=0)
-    axes.margins(x=0.12)
     axes.set_xlim(left=-1)
     axes.grid(alpha=0.3)
-    legend = axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False, fontsize="small")
-    for text in legend.get_texts():
+
+
+def _legend(figure: Figure, axes: Axes) -> None:
+    """Put the legend below the axes, in as many columns as fit; scenes' names are taken literally."""
+    handles, labels = axes.get_legend_handles_labels()
+    columns = max(1, min(4, _COLUMNS // (max(map(len, labels)) + 6)))
+    place: dict[str, Any] = {"loc": "outside lower center", "ncols": columns, "frameon": False, "fontsize": "small"}
+    for text in figure.legend(handles, labels, **place).get_texts():
         text.set_parse_math(False)

@@ -1,6 +1,6 @@
 """The parts of figures: axes in pixels, maps with a colour bar, legends that say what is missing."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
@@ -8,13 +8,21 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.colors import Colormap, FuncNorm, ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from semidense.pipeline.figures.colours import NONE, disparity_colours, disparity_span
+from semidense.pipeline.figures.colours import (
+    CONFIDENCE_TICKS,
+    NONE,
+    confidence_at,
+    confidence_colours,
+    confidence_share,
+    disparity_colours,
+    disparity_span,
+)
 
 PANEL = 6.0
 """Width of the panel of an image, inches."""
@@ -36,12 +44,27 @@ class Scale:
         low: value of the first colour.
         high: value of the last colour.
         label: quantity and unit, for the colour bar.
+        ticks: values that are written beside it; None leaves them to Matplotlib.
+        places: where values lie between low and high, as 0 to 1, and the inverse; None is a straight scale.
     """
 
     colours: Colormap
     low: float
     high: float
     label: str
+    ticks: tuple[float, ...] | None = None
+    places: tuple[Callable[..., Any], Callable[..., Any]] | None = None
+
+    def norm(self) -> Normalize:
+        """Return Matplotlib's form of the scale."""
+        return FuncNorm(self.places, self.low, self.high) if self.places else Normalize(self.low, self.high)
+
+
+def confidence_scale() -> Scale:
+    """Return the scale of confidence maps: log-odds, so that the middle can be seen."""
+    low, high = CONFIDENCE_TICKS[0], CONFIDENCE_TICKS[-1]
+    places = confidence_share, confidence_at
+    return Scale(confidence_colours(), low, high, "confidence (0 to 1)", CONFIDENCE_TICKS, places)
 
 
 def disparity_scale(disparity: NDArray[Any], label: str = "disparity (px)") -> Scale:
@@ -73,14 +96,16 @@ def image_panels(
 
 def draw_map(axes: Axes, values: NDArray[Any], scale: Scale) -> None:
     """Draw a map (y, x) with its colour bar; arrows on the bar say that values lie beyond its ends."""
-    picture = axes.imshow(
-        np.ma.masked_invalid(values), cmap=scale.colours, vmin=scale.low, vmax=scale.high, interpolation="nearest"
-    )
+    masked = np.ma.masked_invalid(values)
+    picture = axes.imshow(masked, cmap=scale.colours, norm=scale.norm(), interpolation="nearest")
     known = values[np.isfinite(values)]
     below, above = bool((known < scale.low).any()), bool((known > scale.high).any())
     extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")
     # An inset is as high as the image, whatever room the layout leaves around it.
-    axes.figure.colorbar(picture, cax=axes.inset_axes((1.02, 0, 0.035, 1)), label=scale.label, extend=extend)
+    place = axes.inset_axes((1.02, 0, 0.035, 1))
+    bar = axes.figure.colorbar(picture, cax=place, label=scale.label, extend=extend)
+    if scale.ticks:
+        bar.set_ticks(list(scale.ticks), labels=[f"{each:g}" for each in scale.ticks])
 
 
 def draw_classes(axes: Axes, classes: NDArray[Any], colours: Sequence[str]) -> None:

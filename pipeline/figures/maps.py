@@ -5,9 +5,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from semidense.pipeline.figures.colours import NONE, ORANGE, SKY, confidence_colours, view_rgb
+from semidense.pipeline.figures.colours import NONE, ORANGE, SKY, view_rgb
 from semidense.pipeline.figures.drawing import (
     Scale,
+    confidence_scale,
     disparity_scale,
     draw_classes,
     draw_map,
@@ -80,11 +81,10 @@ def draw_disparity(figure: Figure, dataset: xr.Dataset) -> None:
 
 
 def draw_confidence(figure: Figure, dataset: xr.Dataset) -> None:
-    """Draw a confidence map on the scale from 0 to 1."""
+    """Draw a confidence map on a scale of log-odds."""
     confidence = dataset["confidence"].values
     axes = image_panels(figure, confidence.shape)[0, 0]
-    scale = Scale(confidence_colours(), 0, 1, "confidence (0 to 1)")
-    draw_map(axes, confidence, scale)
+    draw_map(axes, confidence, confidence_scale())
     axes.set_title("probability that the disparity is right")
     legend_below(figure, (none_patch(confidence),))
 

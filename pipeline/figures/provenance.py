@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
+from textwrap import wrap
 from typing import TypeVar
 
 from matplotlib.axes import Axes
@@ -15,8 +16,9 @@ from semidense.cache import code_hash_of
 from semidense.cache.keys.recipe import short
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.provenance import Ancestor
+from semidense.pipeline.results.text import value_text
 
-WIDTH, HEIGHT = 2.5, 1.25
+WIDTH, HEIGHT = 2.5, 1.5
 """Inches of a box with the space around it."""
 PIXELS, POINTS = 150, 72
 """Units an inch: of a PNG, and of SVG and PDF, which are drawn in points."""
@@ -26,6 +28,10 @@ COLOURS = {"origin": "#dceefb", "net": "#fdeccb", "product": "#f4f4f4", "gone": 
 
 LINE_WIDTH = 0.3
 """Columns that a line needs to pass a row; a box needs 1."""
+_LETTERS, _LINES = 40, 3
+"""Letters in a line of a box, and lines of settings."""
+_NO_SETTINGS = ("tiles", "files", "parameters", "reader", "shipped")
+"""Parameters that are none, or that the box names as its origin."""
 SWEEPS = 8
 """Number of times that the rows are reordered, down and up; more did not change the pictures tried."""
 
@@ -217,4 +223,11 @@ def _text(box: Box, found: Sequence[Ancestor]) -> str:
     origin = "".join(f"\n{name} {short(value)}" for name, value in each.origins.items() if name != "reader")
     code = f"\ncode {short(code_hash_of(each.entry.recipe.code))}"
     key = "" if len(found) > 1 else f"\n{short(each.entry.key)}"
-    return f"{title}\n{scene}{key}{origin if len(found) == 1 else ''}{code}"
+    return f"{title}\n{scene}{_settings(each.entry.recipe.params)}{key}{origin if len(found) == 1 else ''}{code}"
+
+
+def _settings(params: Mapping[str, object]) -> str:
+    """Return the settings of a product as lines of a box: as many as fit; what is read has none."""
+    told = [f"{name} {value_text(value)}" for name, value in params.items() if name not in _NO_SETTINGS]
+    lines = wrap(", ".join(told), _LETTERS, max_lines=_LINES, placeholder=" ...")
+    return "".join(f"\n{line}" for line in lines)

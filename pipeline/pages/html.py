@@ -2,16 +2,19 @@
 
 from collections.abc import Sequence
 from html import escape
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.colors import Colormap, to_hex
 
 from semidense.pipeline.figures.colours import (
+    CONFIDENCE_TICKS,
     ERROR_COLOURS,
     ERROR_LABELS,
     NONE,
     UNKNOWN,
     confidence_colours,
+    confidence_share,
     disparity_colours,
 )
 
@@ -65,29 +68,40 @@ def folded(summary: str, *content: Html) -> Html:
 
 _STOPS = 12
 """Number of colours in the bar of a legend."""
+_BAR = 7.5
+"""Length of the bars of a scale together, em."""
 
 
 def disparity_legend(span: tuple[float, float], none: str) -> Html:
     """Return the legend of a disparity map; ``none`` says what black means."""
-    return _gradient(disparity_colours(), f"{span[0]:g} px (far)", f"{span[1]:g} px (near)") + swatch(NONE, none)
+    ends = (f"{span[0]:g} px (far)", f"{span[1]:g} px (near)")
+    return _gradient(disparity_colours(), ends, (0, 1)) + swatch(NONE, none)
 
 
 def confidence_legend(none: str = "none") -> Html:
-    """Return the legend of a confidence map."""
-    return _gradient(confidence_colours(), "0 (wrong)", "1 (right)") + swatch(NONE, none)
+    """Return the legend of a confidence map: a bar between each two confidences that are named."""
+    shares = confidence_share(np.array(CONFIDENCE_TICKS)).tolist()
+    return _gradient(confidence_colours(), [f"{each:g}" for each in CONFIDENCE_TICKS], shares) + swatch(NONE, none)
 
 
-def error_legend(shares: list[str] | None = None, none: str = "no disparity") -> Html:
+def error_legend(shares: Sequence[str] = (), none: str = "no disparity") -> Html:
     """Return the legend of a map of errors; with the share of each class, if ``shares`` are given."""
     told = [f"{label}: {share}" for label, share in zip(ERROR_LABELS, shares, strict=True)] if shares else ERROR_LABELS
     classes = [swatch(colour, label) for colour, label in zip(ERROR_COLOURS, told, strict=True)]
     return "".join([*classes, swatch(NONE, none), swatch(UNKNOWN, "truth unknown")])
 
 
-def _gradient(colours: Colormap, low: str, high: str) -> Html:
-    stops = ", ".join(to_hex(each) for each in colours(np.linspace(0, 1, _STOPS)))
-    bar = tag("span", class_="bar", style=f"background: linear-gradient(to right, {stops})")
-    return tag("span", text(low), bar, text(high), class_="scale")
+def _gradient(colours: Colormap, labels: Sequence[str], places: Sequence[float]) -> Html:
+    """Return a scale: labels at places between 0 and 1, and a bar of colours between each two."""
+    width = f"{_BAR / (len(labels) - 1):.3g}em"
+    bars = [_bar(colours, *ends, width) for ends in pairwise(places)]
+    parts = [part for label, bar in zip(labels, [*bars, ""], strict=True) for part in (text(label), bar)]
+    return tag("span", *parts, class_="scale")
+
+
+def _bar(colours: Colormap, start: float, end: float, width: str) -> Html:
+    stops = ", ".join(to_hex(each) for each in colours(np.linspace(start, end, _STOPS)))
+    return tag("span", class_="bar", style=f"width: {width}; background: linear-gradient(to right, {stops})")
 
 
 def swatch(colour: str, label: str) -> Html:

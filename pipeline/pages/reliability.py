@@ -13,6 +13,8 @@ from semidense.stages.metrics.errors import MASKS, THRESHOLDS
 from semidense.stages.metrics.tally import Tally
 
 _BINS = 10
+_ROUNDING = 1e-9
+"""What a threshold such as 0.3 may lie below its tenth when it is multiplied."""
 _FEWEST = 50
 """Least number of pixels in a bin that is drawn: the share of fewer says little."""
 
@@ -43,38 +45,37 @@ def reliability(tallies: list[Tally], mask: str = "all", threshold: float = 1.0)
     """Return how often pixels are right, by confidence, over all pixels of several scenes.
 
     Args:
-        tallies: one a scene, with the thresholds ``STEPS``.
+        tallies: one a scene, with thresholds at every tenth.
         mask: ``all`` is what the evaluation-Net learns: hidden pixels count too.
         threshold: px, error up to which a pixel is right.
     """
     m, t = MASKS.index(mask), THRESHOLDS.index(threshold)
-    pixels = _tenths([each.reported[m] for each in tallies])
-    wrong = _tenths([each.wrong[m, t] for each in tallies])
-    confidence = _tenths([each.confidence[m] for each in tallies])
+    pixels = _tenths(tallies, [each.reported[m] for each in tallies])
+    wrong = _tenths(tallies, [each.wrong[m, t] for each in tallies])
+    confidence = _tenths(tallies, [each.confidence[m] for each in tallies])
     whole = np.where(pixels > 0, pixels, np.nan)
     return Reliability(confidence / whole, (pixels - wrong) / whole, pixels)
 
 
-def _tenths(scenes: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return sums over hundredths as sums over tenths and scenes; a confidence of 1 belongs to the last."""
-    sums = np.sum(scenes, axis=0)
-    tenths: NDArray[np.float64] = sums[:-1].reshape(_BINS, -1).sum(axis=1)
-    tenths[-1] += sums[-1]
-    return tenths
+def _tenths(tallies: list[Tally], scenes: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return sums over the bins of tallies as sums over tenths and scenes; a confidence of 1 belongs to the last."""
+    places = [np.minimum((each.Rs * _BINS + _ROUNDING).astype(int), _BINS - 1) for each in tallies]
+    tenths = [np.bincount(*each, _BINS) for each in zip(places, scenes, strict=True)]
+    total: NDArray[np.float64] = np.sum(tenths, axis=0)
+    return total
 
 
 def reliability_figure(found: Reliability, *, title: str, mask: str = "all", threshold: float = 1.0) -> Figure:
     """Return the diagram, and below it how many pixels each bin has. Bins of fewer than 50 pixels are left out."""
     figure = new_figure(title)
-    figure.set_size_inches(6.5, 6.2)
+    figure.set_size_inches(6.2, 6)
     upper, lower = figure.subplots(2, 1, height_ratios=(4, 1), sharex=True)
     _draw_shares(upper, found)
-    upper.set_ylabel(f"right: {mask} pixels off by at most {threshold:g} px (%)")
+    upper.set_ylabel(f"share of {mask} pixels\noff by at most {threshold:g} px (0 to 1)")
     centres = (np.arange(_BINS) + 0.5) / _BINS
     lower.bar(centres, found.pixels / max(found.pixels.sum(), 1), 0.9 / _BINS, color=SKY)
-    lower.set(xlabel="confidence (0 to 1)", ylabel="pixels (%)", xlim=(0, 1))
+    lower.set(xlabel="confidence (0 to 1)", ylabel="share of\npixels (0 to 1)", xlim=(0, 1))
     for axes in (upper, lower):
-        axes.yaxis.set_major_formatter(lambda share, _: f"{100 * share:.0f}")
         axes.grid(alpha=0.3)
     return figure
 

@@ -26,6 +26,7 @@ class SceneMaps:
         disparity: (y, x) float32, px, before filtering.
         confidence: (y, x) float32 in [0, 1].
         truth: (y, x) float32, px, NaN unknown.
+        nonocc: (y, x) bool, pixels that both views see and whose truth is known.
         mask_kind: where the mask of pixels that both views see comes from.
     """
 
@@ -35,6 +36,7 @@ class SceneMaps:
     disparity: NDArray[np.float32] | None
     confidence: NDArray[np.float32] | None
     truth: NDArray[np.float32] | None
+    nonocc: NDArray[np.bool_] | None
     mask_kind: str
     _arrays: Mapping[str, Mapping[str, Any]]
 
@@ -65,6 +67,7 @@ class SceneMaps:
             disparity=maps.get("disparity"),
             confidence=maps.get("confidence"),
             truth=maps.get("truth"),
+            nonocc=thinned(arrays["truth"]["nonocc"], step).astype(bool) if "truth" in arrays else None,
             mask_kind=MASK_KINDS[int(np.asarray(arrays["truth"]["mask_kind"][...])[0])] if "truth" in arrays else "",
             _arrays=arrays,
         )

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from semidense.stages.metrics.errors import MASKS, THRESHOLDS, Errors, counted, pixels_of
 
 STEPS = tuple(index / 100 for index in range(101))
-"""The thresholds R: 0 to 1 in steps of 0.01."""
+"""The thresholds R that a user sets: 0 to 1 in steps of 0.01."""
+FINE = tuple(sorted({*STEPS, *(1 - 10 ** (-tenth / 10) for tenth in range(21, 61))}))
+"""``STEPS`` and, above 0.99, ten thresholds a power of ten: half of the pixels may lie there."""
 Sums = NDArray[np.float64]
 
 
@@ -52,7 +54,7 @@ class Tally:
     squared: Sums
 
     @classmethod
-    def of(cls, blocks: Iterable[Block], Rs: Iterable[float] = STEPS) -> "Tally":
+    def of(cls, blocks: Iterable[Block], Rs: Iterable[float] = FINE) -> "Tally":
         """Count a scene, block by block, at the thresholds ``Rs``: rising, the first 0."""
         found = cls._empty(np.array(list(Rs)))
         for block in blocks:

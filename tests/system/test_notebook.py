@@ -44,3 +44,12 @@ def test_the_pictures_of_the_page_are_there() -> None:
     pictures = re.findall(r"\]\((pictures/[^)]+)\)", PAGE.read_text())
     assert pictures
     assert [name for name in pictures if not (PAGE.parent / name).is_file()] == []
+
+
+def test_the_notebook_ships_with_its_outputs() -> None:
+    cells = [cell for cell in json.loads(NOTEBOOK.read_text())["cells"] if cell["cell_type"] == "code"]
+    assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
+    shown = [output["data"] for cell in cells for output in cell["outputs"]]
+    assert len(shown) >= 5
+    assert any("image/png" in data for data in shown)
+    assert "/tmp" not in json.dumps(shown), "an output names a folder of the machine that made it"

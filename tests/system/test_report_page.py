@@ -1,5 +1,6 @@
 """The report in a real browser: light, dark, narrow, printed, and without a mouse."""
 
+import re
 import time
 from collections.abc import Callable
 from typing import Any
@@ -85,14 +86,39 @@ def test_a_picture_moved_right_after_another_leads_all(look: Callable[..., Seen]
     wait_until(seen, f"{places}.every((place) => Math.abs(place - 30) < 1)")
 
 
-def test_print_shows_what_is_folded_and_no_controls(look: Callable[..., Seen], address: str) -> None:
+def test_a_scene_is_printed_on_three_pages_without_controls(look: Callable[..., Seen], address: str) -> None:
     page: Any = look(address).page
     SCREENS.mkdir(parents=True, exist_ok=True)
-    assert page.pdf(path=SCREENS / "report.pdf")[:4] == b"%PDF"
+    printed = page.pdf(path=SCREENS / "report.pdf", format="A4")
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) <= 3
     page.emulate_media(media="print")
-    assert not page.locator(".zoom").first.is_visible()
-    page.evaluate("dispatchEvent(new Event('beforeprint'))")
-    assert page.evaluate("document.querySelectorAll('details:not([open])').length") == 0
+    for hidden in (".zoom", "nav", "#how-it-was-made", "summary"):
+        assert not page.locator(hidden).first.is_visible()
+    assert page.locator(".gallery").first.is_visible()
+
+
+def test_results_come_before_what_made_them(look: Callable[..., Seen], address: str) -> None:
+    page: Any = look(address).page
+    top = "(place) => document.querySelector(place).getBoundingClientRect().top"
+    tops = [page.evaluate(top, place) for place in (".cards", ".gallery", "table", ".chart", "#how-it-was-made")]
+    assert tops == sorted(tops)
+    assert tops[1] < WIDE[1], "the first picture is on the first screen"
+
+
+def test_every_share_names_its_mask_and_all_agree(look: Callable[..., Seen], address: str) -> None:
+    page: Any = look(address).page
+    cards = page.locator(".card").all_inner_texts()
+    assert len(cards) >= 3, "the error of what is kept is told where something is"
+    assert all("nonocc" in card for card in cards)
+    kept = next(card.split("\n")[0] for card in cards if "kept at R" in card)
+    captions = page.locator("figure:last-child .legend").first.inner_text()
+    assert f"kept: {kept} of the nonocc pixels" in captions
+
+
+def test_charts_fit_a_narrow_screen(look: Callable[..., Seen], address: str) -> None:
+    page: Any = look(address, NARROW).page
+    ends = "[...document.querySelectorAll('.chart svg')].map((chart) => chart.getBoundingClientRect().right)"
+    assert max(each for each in page.evaluate(ends)) <= NARROW[0]
 
 
 def test_the_curve_is_the_sweep_s(look: Callable[..., Seen], address: str, own_task: Task) -> None:

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from semidense.stages.evaluation.filtering import keep_confident
 from semidense.stages.metrics.errors import Errors
+from semidense.stages.metrics.tally import FINE
 from tests.handmade import Handmade, handmade, judge
 from tests.system.conftest import NARROW, WIDE, Seen, serving
 
 pytest.importorskip("bokeh", reason="Bokeh is not installed: pip install -e .[dev]")
-SIZE, QUARTER = (60, 90), (500, 741)
+SIZE, OTHER, QUARTER = (60, 90), (40, 100), (500, 741)
 """Rows and columns of the scenes."""
 DOUBLE = 500
 """Milliseconds after which a second click is one of its own, not the second half of a double click."""
@@ -40,6 +41,7 @@ class Running:
 
 @contextmanager
 def running(cache: Path, size: tuple[int, int], disparities: int) -> Iterator[Running]:
+    handmade(cache, *OTHER, disparities, seed=1, scene="Other")
     made = handmade(cache, *size, disparities)
     first = made.arrays["confidence"]["confidence"]
     judge(made, first[::-1].copy(), 1)
@@ -187,10 +189,71 @@ def test_two_configurations_meet_at_the_line(seen: Seen, small: Running) -> None
     seen.page.evaluate(f"{model('show')}.active = 3; {model('swipe')}.value = 40")
     shown = array(seen, "swiped-data", "confidence").reshape(SIZE)
     edge = round(0.4 * SIZE[1])
+    figures = told(seen)
+    assert {"bad", "second-bad"} <= set(figures), "both configurations have their figures"
+    assert len(seen.page.evaluate(f"[...{model('second-table')}.data.R]")) == len(FINE)
     np.testing.assert_array_equal(shown[:, :edge], small.confidences[0][:, :edge])
     np.testing.assert_array_equal(shown[:, edge:], small.confidences[1][:, edge:])
     seen.page.wait_for_timeout(500)
     seen.keep("viewer-swipe")
+    assert seen.said == []
+
+
+def drawn(seen: Seen, name: str) -> str:
+    """Return the pixels of a map on the screen."""
+    seen.page.wait_for_timeout(300)
+    canvas = f"Bokeh.index.find_one({model(name)}).canvas_view.primary.canvas"
+    pixels: str = seen.page.evaluate(f"{canvas}.toDataURL()")
+    return pixels
+
+
+def choose(seen: Seen, scene: str) -> None:
+    seen.page.evaluate(f"{model('scene')}.value = '{scene}'")
+    height, width = OTHER if scene == "Other" else SIZE
+    seen.page.wait_for_function(f"{model('kept-data')}.data.disparity[0].length === {height * width}")
+
+
+def test_a_click_and_then_another_scene_draws_it_whole(look: Look, small: Running) -> None:
+    """A selected picture would keep the size that it had when it was clicked."""
+    seen = visit(look, small)
+    choose(seen, "Other")
+    before = {name: drawn(seen, name) for name in ("left", "raw", "kept")}
+    choose(seen, "Hand")
+    click(seen, "left", 31, 52)
+    seen.page.wait_for_function(f"{model('pixel')}.text.includes('y = ')")
+    choose(seen, "Other")
+    assert {name: drawn(seen, name) for name in before} == before
+
+
+def test_a_clicked_pixel_is_in_sight(seen: Seen) -> None:
+    seen.page.evaluate("scrollTo(0, 0)")
+    click(seen, "raw", 20, 40)
+    seen.page.wait_for_function(f"{model('pixel')}.text.includes('y = ')")
+    seen.page.wait_for_timeout(500)
+    top, bottom = seen.page.evaluate(
+        "(({top, bottom}) => [top, bottom])(document.querySelector('.place').getBoundingClientRect())"
+    )
+    assert WIDE[1] / 4 < top < bottom <= WIDE[1]
+    seen.page.get_by_role("button", name="close").click()
+    seen.page.wait_for_function(f"{model('pixel')}.text.startsWith('Click')")
+
+
+def test_maps_can_be_made_larger(seen: Seen) -> None:
+    before = box(seen, "raw")["w"]
+    seen.page.evaluate(f"{model('size')}.value = 'full width'")
+    seen.page.wait_for_timeout(1000)
+    assert box(seen, "raw")["w"] > 2.5 * before
+    seen.page.evaluate(f"{model('size')}.value = 'small maps'")
+
+
+def test_it_follows_a_dark_setting(look: Look, small: Running) -> None:
+    seen = look(small.address, WIDE, "dark")
+    seen.page.wait_for_function(f"window.Bokeh && Bokeh.documents.length && {model('told')}?.text.includes('rms')")
+    seen.keep("viewer-dark")
+    paper = seen.page.evaluate("getComputedStyle(document.body).backgroundColor")
+    ink = seen.page.evaluate(f"{model('curve')}.below[0].axis_label_text_color")
+    assert paper == "rgb(20, 24, 29)"
+    assert ink == "#e8ebef"
     assert seen.said == []
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from semidense.pipeline.figures.colours import disparity_span
 from semidense.pipeline.pages.html import Html, tag, text
@@ -12,9 +13,11 @@ from semidense.pipeline.pages.report.pictures import (
     confidence_picture,
     disparity_picture,
     error_picture,
+    percent,
     photo,
 )
 from semidense.pipeline.pages.scene_maps import SceneMaps
+from semidense.pipeline.results.metric_rows import MASK, THRESHOLD
 from semidense.stages.evaluation.filtering import keep_confident
 from semidense.stages.metrics.tally import Tally
 
@@ -24,7 +27,7 @@ def gallery(name: str, maps: SceneMaps, thresholds: tuple[float, ...]) -> Html:
     height, width = maps.size
     shown = f", every {maps.step}. row and column shown" if maps.step > 1 else ""
     mask = f"; mask nonocc: {maps.mask_kind}" if maps.mask_kind else ""
-    about = tag("p", text(f"{width} x {height} px{shown}{mask}"), class_="quiet")
+    about = tag("p", text(f"{width} x {height} px{shown}{mask}"), class_="quiet about")
     ratio = f"aspect-ratio: {width} / {height}"
     figures = [_figure(picture, ratio) for picture in _pictures(maps, thresholds)]
     grid = tag("div", *figures, class_="gallery")
@@ -55,15 +58,15 @@ def _pictures(maps: SceneMaps, thresholds: tuple[float, ...]) -> Iterator[Pictur
         return
     yield disparity_picture("raw disparity, before filtering", maps.disparity, span, "none")
     error = maps.error()
-    if error is not None and maps.truth is not None:
-        yield error_picture("error of the raw disparity", error, maps.truth)
+    if error is not None and maps.truth is not None and maps.nonocc is not None:
+        yield error_picture("error of the raw disparity", error, maps.truth, maps.nonocc)
     if maps.confidence is None:
         return
     yield confidence_picture("confidence", maps.confidence)
     for R in thresholds:
         kept = keep_confident(maps.disparity, maps.confidence, R)
         picture = disparity_picture(f"kept at R = {R:g}", kept, span, "not kept")
-        yield replace(picture, legend=picture.legend + _told(maps.tally, R))
+        yield replace(picture, legend=picture.legend + _told(maps.tally, R, kept))
 
 
 def _span(maps: SceneMaps) -> tuple[float, float]:
@@ -72,9 +75,11 @@ def _span(maps: SceneMaps) -> tuple[float, float]:
     return disparity_span(np.concatenate(known)) if known else (0, 1)
 
 
-def _told(tally: Tally | None, R: float) -> Html:
-    """Return the caption of a filtered map: the error of the kept pixels; empty if the truth is not known."""
-    rows = [row for row in tally.rows("", "nonocc", 1.0) if row["R"] == R and "bad" in row] if tally else []
-    return (
-        tag("span", text(f"{rows[0]['bad']:.1f} % of the kept nonocc pixels wrong by more than 1 px")) if rows else ""
-    )
+def _told(tally: Tally | None, R: float, kept: NDArray[np.float32]) -> Html:
+    """Return the caption of a filtered map: the share that is kept and, where the truth is known, its error."""
+    rows = [row for row in tally.rows("", MASK, THRESHOLD) if row["R"] == R] if tally else []
+    if not rows:
+        return tag("span", text(f"kept: {percent(np.isfinite(kept))} of all pixels"))
+    share = f"kept: {100 - rows[0]['invalid']:.1f} % of the {MASK} pixels"
+    wrong = f"; {rows[0]['bad']:.1f} % of these are off by more than {THRESHOLD:g} px" if "bad" in rows[0] else ""
+    return tag("span", text(share + wrong))

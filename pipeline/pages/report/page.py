@@ -4,7 +4,6 @@ import json
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from importlib.resources import files
-from itertools import chain
 from typing import Any
 
 from semidense.pipeline.comparison.figures import dots_figure
@@ -29,8 +28,13 @@ from semidense.pipeline.results.text import time_text
 from semidense.stages.metrics.tally import Tally
 
 _CURVE = tuple(percent / 100 for percent in range(0, 100, 5))
-"""The thresholds R of the curve."""
-_CURVE_CAPTION = "The points of the curve, of several scenes their mean; - where a scene keeps no pixel"
+"""The thresholds R of the table below the curve."""
+_MARKED = (0.0, 0.5, 0.9, 0.99)
+"""The thresholds R that are written beside the curve."""
+_CURVE_CAPTION = "Some points of the curve, of several scenes their mean; - where a scene keeps no pixel"
+
+_BEHIND = "How it was made"
+"""The last part, which is not printed."""
 
 GENERATOR = '<meta name="generator" content="semidense-stereo">'
 """By this a report is known."""
@@ -65,20 +69,21 @@ def _head(title: str) -> Html:
 
 
 def _title(found: Gathered) -> Iterator[Html]:
-    yield tag("h1", text(f"Semi-dense stereo: {found.task.dataset}"))
-    settings = [f"--set {each}" for each in found.task.settings] + ["--train"] * found.task.train
-    told = f"with {' '.join(settings)}" if settings else "with the default settings"
-    yield tag("p", text(f"{told}; written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"), class_="quiet")
+    task = found.task
+    scenes = [scene.name for scene in found.scenes]
+    yield tag("h1", text(f"Semi-dense stereo: {scenes[0] if len(scenes) == 1 else f'{len(scenes)} scenes'}"))
+    chosen = [f"--config {task.config}"] * bool(task.config) + [f"--set {each}" for each in task.settings]
+    told = " ".join([f"--preset {task.preset}", *chosen, *["--train"] * task.train])
+    yield tag("p", text(f"{task.dataset}, {told}; written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"), class_="quiet")
 
 
 def _cards(found: Gathered) -> Html:
-    """Return the most important figures as cards for the top of the page."""
+    """Return the most important figures as cards for the top of the page; of several scenes their mean."""
     rows = [row for row in found.rows if row["mask"] == MASK and row["threshold_px"] == THRESHOLD]
-    count = len(found.scenes)
-    cards = [(str(count), "scenes with something cached" if count > 1 else f"scene: {found.scenes[0].name}")]
-    if rows:
-        mean = averaged(rows)[0]
-        cards += [(value, about) for name, value, about in _figures(mean, found.R) if name in mean]
+    if not rows:
+        return ""
+    mean = averaged(rows)[0]
+    cards = [(value, about) for name, value, about in _figures(mean, found.R) if name in mean]
     return tag(
         "div",
         *(tag("div", tag("b", text(value)), tag("span", text(about)), class_="card") for value, about in cards),
@@ -87,34 +92,39 @@ def _cards(found: Gathered) -> Html:
 
 
 def _figures(mean: Mapping[str, Any], R: float) -> list[tuple[str, str, str]]:
-    wrong = f"more than {THRESHOLD:g} px off"
+    wrong = f"off by more than {THRESHOLD:g} px"
+    auc = f"AUC of the confidence ({MASK}, {THRESHOLD:g} px); a perfect order has {mean.get('auc_optimal', 0):.4f}"
     return [
-        ("raw_bad", f"{mean.get('raw_bad', 0):.1f} %", f"of all pixels {wrong} before filtering"),
-        ("bad", f"{mean.get('bad', 0):.1f} %", f"of the kept pixels {wrong}, R = {R:g}"),
-        ("invalid", f"{100 - mean.get('invalid', 0):.1f} %", f"of the pixels kept at R = {R:g}"),
-        (
-            "auc",
-            f"{mean.get('auc', 0):.4f}",
-            f"AUC of the confidence; a perfect one has {mean.get('auc_optimal', 0):.4f}",
-        ),
+        ("raw_bad", f"{mean.get('raw_bad', 0):.1f} %", f"of the {MASK} pixels {wrong} before filtering"),
+        ("invalid", f"{100 - mean.get('invalid', 0):.1f} %", f"of the {MASK} pixels kept at R = {R:g}"),
+        ("bad", f"{mean.get('bad', 0):.1f} %", f"of the kept {MASK} pixels {wrong}"),
+        ("auc", f"{mean.get('auc', 0):.4f}", auc),
     ]
 
 
 def _parts(found: Gathered) -> Iterator[tuple[str, Html]]:
-    yield "What ran", _what_ran(found)
+    thresholds = tuple(sorted({0.5, 0.7, found.R}))
+    yield "Pictures", "".join(gallery(scene.name, scene.maps, thresholds) for scene in found.scenes if scene.maps)
     yield "Figures", metrics_tables(found.rows, found.R) + _note() if found.rows else ""
     yield "Error against invalid pixels", _curves(found)
     yield "Confidence", _confidence(found)
-    thresholds = tuple(sorted({0.5, 0.7, found.R}))
-    yield "Scenes", "".join(gallery(scene.name, scene.maps, thresholds) for scene in found.scenes if scene.maps)
-    yield "Networks", networks(found)
-    yield "Configuration and versions", _configuration(found)
+    yield _BEHIND, _behind(found)
+
+
+def _behind(found: Gathered) -> Html:
+    """Return what a reader of the results can do without, closed."""
+    parts = (
+        ("What ran", _what_ran(found)),
+        ("Networks", networks(found)),
+        ("Settings, versions and keys", _configuration(found)),
+    )
+    return "".join(folded(title, body) for title, body in parts if body)
 
 
 def _what_ran(found: Gathered) -> Html:
     hits = len(found.hits)
     beside = sum(len(scene.baselines) for scene in found.scenes)
-    told = f"{hits} of {len(found.plan.steps)} products are cached. What is missing is left out below."
+    told = f"{hits} of {len(found.plan.steps)} products are cached. What is missing is left out above."
     told += f" For comparison, {beside} products of other methods are cached." if beside else ""
     notes = "".join(tag("li", text(note)) for note in found.plan.notes)
     return (
@@ -124,11 +134,11 @@ def _what_ran(found: Gathered) -> Html:
 
 def _note() -> Html:
     told = (
-        "raw bad: wrong pixels of the map before filtering; those without a disparity count as wrong. bad: wrong "
-        "pixels among those the filtered map keeps. invalid: pixels that it does not keep. avgerr, rms: mean and root "
-        "mean squared error of the kept pixels. A figure that one scene lacks has no mean. Mask nonocc: pixels that "
-        "both views see; all: also those hidden in the right view; both only where the truth is known. Thresholds are "
-        "in pixels of the image at hand."
+        "The mask nonocc has the pixels that both views see, all also those hidden in the right view; both only where "
+        "the truth is known. raw bad: wrong pixels of the map before filtering; a pixel without a disparity is wrong. "
+        "invalid: pixels that the filtered map does not keep. bad: wrong pixels among those that it keeps. avgerr, "
+        "rms: mean and root mean squared error of the kept pixels. Thresholds are in pixels of the image at hand. A "
+        "figure that one scene lacks has no mean."
     )
     return tag("p", text(told), class_="quiet")
 
@@ -138,15 +148,16 @@ def _tallies(found: Gathered) -> list[tuple[str, Tally]]:
 
 
 def _curves(found: Gathered) -> Html:
-    rows = chain.from_iterable(tally.rows(name, threshold=THRESHOLD) for name, tally in _tallies(found))
+    rows = [row for name, tally in _tallies(found) for row in tally.rows(name, threshold=THRESHOLD)]
     chosen = [row for row in rows if row["R"] in _CURVE]
     if not any("bad" in row for row in chosen):
         return ""
     drawn = error_curve_figure(
-        chosen,
+        rows,
         title="What a threshold on the confidence buys, and what it costs",
         threshold=THRESHOLD,
         others=matcher_points(found.compared, len(_tallies(found))),
+        marked=_MARKED,
     )
     names = ("invalid", "bad")
     points = [[f"{row['R']:g}", *(FIGURES[name].text(row.get(name)) for name in names)] for row in averaged(chosen)]
@@ -166,7 +177,7 @@ def _confidence(found: Gathered) -> Html:
     rows = measure_points(found.compared)
     if not rows:
         return tag("div", diagram, ranked, class_="charts")
-    dots = dots_figure(rows, "auc", title="How well does a confidence rank pixels?", width=6.5)
+    dots = dots_figure(rows, "auc", title="How well does a confidence rank pixels?", width=6.2)
     areas = svg(dots, "Area under the error curve of each measure of confidence: its mean, and a dot a scene")
     return tag("div", diagram, areas, class_="charts") + ranked
 

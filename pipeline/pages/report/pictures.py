@@ -19,6 +19,7 @@ from semidense.pipeline.figures.colours import (
     SKY,
     UNKNOWN,
     confidence_colours,
+    confidence_share,
     disparity_colours,
     error_classes,
 )
@@ -60,14 +61,12 @@ def photo(title: str, view: NDArray[np.uint8]) -> Picture:
 
 def disparity_picture(title: str, disparity: NDArray[Any], span: tuple[float, float], none: str) -> Picture:
     """Return a disparity map; ``none`` says what a missing value means."""
-    legend = disparity_legend(span, f"{none}: {_percent(~np.isfinite(disparity))}")
-    return Picture(title, _scaled(disparity, span, disparity_colours()), legend)
+    return Picture(title, _scaled(disparity, span, disparity_colours()), disparity_legend(span, none))
 
 
 def confidence_picture(title: str, confidence: NDArray[Any]) -> Picture:
-    """Return a confidence map on the scale from 0 to 1."""
-    legend = confidence_legend(f"none: {_percent(~np.isfinite(confidence))}")
-    return Picture(title, _scaled(confidence, (0, 1), confidence_colours()), legend)
+    """Return a confidence map on the scale of log-odds."""
+    return Picture(title, _scaled(confidence_share(confidence), (0, 1), confidence_colours()), confidence_legend())
 
 
 def _scaled(values: NDArray[Any], span: tuple[float, float], colours: Colormap) -> str:
@@ -79,17 +78,23 @@ def _scaled(values: NDArray[Any], span: tuple[float, float], colours: Colormap) 
     return _indexed(levels, palette)
 
 
-def error_picture(title: str, error: NDArray[Any], truth: NDArray[Any]) -> Picture:
-    """Return an error map in classes; black where the map has no disparity, gray where the truth is not known."""
+def error_picture(title: str, error: NDArray[Any], truth: NDArray[Any], nonocc: NDArray[np.bool_]) -> Picture:
+    """Return an error map in classes; black where the map has no disparity, gray where the truth is not known.
+
+    The legend gives the share of each class among the ``nonocc`` pixels.
+    """
     unknown, none = ~np.isfinite(truth), np.isfinite(truth) & np.isnan(error)
     classes = np.nan_to_num(error_classes(error), nan=0).astype(np.uint8) + 2
     levels = np.where(unknown, 1, np.where(none, 0, classes)).astype(np.uint8)
-    shares = [_percent(levels[~unknown] == index + 2) for index in range(len(ERROR_COLOURS))]
-    legend = error_legend(shares, f"no disparity: {_percent(levels[~unknown] == 0)}")
-    return Picture(title, _indexed(levels, [NONE, UNKNOWN, *ERROR_COLOURS]), legend)
+    counted = levels[nonocc & ~unknown]
+    shares = [percent(counted == index + 2) for index in range(len(ERROR_COLOURS))]
+    legend = error_legend(shares, f"no disparity: {percent(counted == 0)}")
+    told = tag("span", text("shares of the nonocc pixels:"))
+    return Picture(title, _indexed(levels, [NONE, UNKNOWN, *ERROR_COLOURS]), told + legend)
 
 
-def _percent(chosen: NDArray[np.bool_]) -> str:
+def percent(chosen: NDArray[np.bool_]) -> str:
+    """Return the share of the chosen pixels as text: ``12.3 %``."""
     return f"{100 * np.count_nonzero(chosen) / max(chosen.size, 1):.1f} %"
 
 

@@ -47,7 +47,3 @@ for (const scene of document.querySelectorAll(".scene")) {
     });
   }
 }
-// What is folded is printed too.
-let folded = [];
-addEventListener("beforeprint", () => { folded = [...document.querySelectorAll("details:not([open])")]; folded.forEach((each) => { each.open = true; }); });
-addEventListener("afterprint", () => folded.forEach((each) => { each.open = false; }));

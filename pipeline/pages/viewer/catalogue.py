@@ -10,9 +10,9 @@ from typing import Any
 
 from semidense.cache import Entry, Store
 from semidense.cache.entries.index import Content
+from semidense.pipeline.pages.viewer.naming import names
 from semidense.pipeline.plan.steps import SPLIT
 from semidense.pipeline.results.provenance import Provenance, single_inputs
-from semidense.pipeline.results.text import value_text
 
 _ENDS = ("confidence", "disparity")
 """The last product of a configuration: a confidence, or a disparity without one."""
@@ -24,7 +24,7 @@ class Configuration:
     """The products of a scene that were made with one set of settings.
 
     Attributes:
-        name: the settings in which it differs from the scene's other configurations, and when it was made.
+        name: its preset, mode, the settings in which it differs from the scene's others, and when it was made.
         entries: its products, by name; the truth among them, if it is known.
         further: what was made from its products, oldest first: filtered maps, figures, other matchers and measures.
     """
@@ -143,30 +143,8 @@ def _pairs(inputs: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _named(chains: list[Chain], records: _Records) -> tuple[Configuration, ...]:
-    """Name each configuration by the settings that not all share, and by the time it was made."""
+    """Return the configurations of a scene by name, the latest first."""
     latest = sorted(chains, key=lambda chain: max(entry.created for entry in chain.values()), reverse=True)
-    settings = [dict(_settings(chain)) for chain in latest]
-    differing = [
-        name for name in dict.fromkeys(name for each in settings for name in each)
-        if len({each.get(name) for each in settings}) > 1
-    ]  # fmt: skip
     return tuple(
-        Configuration(
-            _name(chain, {name: each[name] for name in differing if name in each}), chain, records.further(chain)
-        )
-        for chain, each in zip(latest, settings, strict=True)
+        Configuration(name, chain, records.further(chain)) for name, chain in zip(names(latest), latest, strict=True)
     )
-
-
-def _settings(chain: Chain) -> Iterator[tuple[str, str]]:
-    for product, entry in chain.items():
-        for name, value in entry.recipe.params.items():
-            if product not in ("images", "truth"):
-                yield f"{product}.{name}", value_text(value)
-
-
-def _name(chain: Chain, differing: Mapping[str, str]) -> str:
-    told = ", ".join(f"{name}={value[:24]}" for name, value in list(differing.items())[:4]) or "the only settings"
-    end = next(entry for entry in chain.values())
-    without = "" if "confidence" in chain else ", no confidence"
-    return f"{told}{without} ({end.created[:16].replace('T', ' ')}, {end.key[:6]})"

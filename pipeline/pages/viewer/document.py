@@ -11,8 +11,8 @@ from semidense.cache import Store
 from semidense.pipeline.pages.viewer.session import Session
 
 _GRID = (
-    ":host { display: grid !important; grid-template-columns: repeat(auto-fill, minmax(min(100%, 17rem), 1fr));"
-    " gap: .9rem; }"
+    ":host { display: grid !important; gap: .9rem;"
+    " grid-template-columns: repeat(auto-fill, minmax(min(100%, var(--map, 17rem)), 1fr)); }"
 )
 _WRAP = ":host { display: flex !important; flex-wrap: wrap; gap: .5rem .9rem; align-items: end; }"
 
@@ -28,6 +28,7 @@ def build(document: Document, store: Store) -> Session:
         controls.compare,
         controls.mask,
         controls.threshold,
+        controls.size,
     )
     boxes = [panel.box for panel in panels.maps.values()]
     frame = Row(controls.nearer, controls.farther, controls.whole, margin=0, spacing=6)
@@ -39,7 +40,7 @@ def build(document: Document, store: Store) -> Session:
         "told": panels.told,
         "maps": Column(*boxes, panels.curve_box, sizing_mode="stretch_width", stylesheets=[_GRID], margin=0),
         "comparison": Column(controls.show, controls.swipe, panels.swiped.box, sizing_mode="stretch_width", margin=0),
-        "place": _wrapping(controls.y, controls.x),
+        "place": _wrapping(controls.y, controls.x, controls.close),
         "pixel": panels.pixel,
         "costs": panels.costs_box,
         "patches": panels.patches,

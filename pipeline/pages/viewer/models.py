@@ -7,6 +7,7 @@ from typing import Any
 from bokeh.models import Button, Column, ColumnDataSource, CustomJS, RadioButtonGroup, Select, Slider, Span, Spinner
 
 from semidense.pipeline.pages.viewer.panels import (
+    CONTROL,
     COST_LEGEND,
     WIDE,
     Frame,
@@ -22,9 +23,13 @@ from semidense.pipeline.pages.viewer.panels import (
 )
 from semidense.stages.metrics.errors import MASKS, THRESHOLDS
 
-SWIPED = ("kept at R", "raw disparity", "error", "confidence")
+ERROR = "error"
+SWIPED = ("kept at R", "raw disparity", ERROR, "confidence")
 """Maps by which two configurations can be compared."""
-_FIGURES = ("R", "invalid", "bad", "avgerr", "rms")
+_POINT = ("invalid", "bad", "label", "side", "colour")
+SIZES = {"small maps": "17rem", "large maps": "34rem", "full width": "100%"}
+"""The least width of a map on the page, by what a user calls it."""
+FIGURES = ("R", "invalid", "bad", "avgerr", "rms")
 
 
 def script(name: str) -> str:
@@ -42,8 +47,10 @@ class Sources:
         self.kept = blank("disparity", "error")
         self.other = blank("disparity", "confidence", "error")
         self.swiped = blank("disparity", "error", "confidence")
-        self.table = ColumnDataSource({name: [] for name in _FIGURES}, name="table")
-        self.point = ColumnDataSource({"invalid": [], "bad": [], "label": [], "side": []}, name="point")
+        self.table = ColumnDataSource({name: [] for name in FIGURES}, name="table")
+        self.second = ColumnDataSource({name: [] for name in FIGURES}, name="second-table")
+        self.names = ColumnDataSource({"name": []}, name="names")
+        self.point = ColumnDataSource({name: [] for name in _POINT}, name="point")
         self.step = ColumnDataSource({"step": [1]})
         self.curve = ColumnDataSource({"d": [0, 1], "cost": [0, 1]}, name="cost-curve")
         self.marks = ColumnDataSource({"d": [], "cost": [], "marker": [], "colour": []}, name="cost-marks")
@@ -68,10 +75,11 @@ class Controls:
     threshold: Select = field(
         default_factory=lambda: _select("wrong above (px)", [f"{each:g}" for each in THRESHOLDS], "1")
     )
+    size: Select = field(default_factory=lambda: _select("size", list(SIZES), next(iter(SIZES))))
     R: Slider = field(
         default_factory=lambda: Slider(
             start=0, end=1, step=0.01, value=0.9, title="R, the least confidence that is kept", name="R",
-            sizing_mode="stretch_width", format="0.00", margin=0, bar_color="#0072B2",
+            sizing_mode="stretch_width", format="0.00", margin=0, bar_color="#0072B2", stylesheets=[CONTROL],
         )
     )  # fmt: skip
     y: Spinner = field(default_factory=lambda: _spinner("row y (px)"))
@@ -79,29 +87,40 @@ class Controls:
     whole: Button = field(default_factory=lambda: _button("whole image"))
     nearer: Button = field(default_factory=lambda: _button("+", "nearer"))
     farther: Button = field(default_factory=lambda: _button("\N{MINUS SIGN}", "farther"))
+    close: Button = field(default_factory=lambda: _button("close"))
     show: RadioButtonGroup = field(
-        default_factory=lambda: RadioButtonGroup(labels=list(SWIPED), active=0, name="show", margin=0)
+        default_factory=lambda: RadioButtonGroup(
+            labels=list(SWIPED), active=0, name="show", margin=0, stylesheets=[CONTROL]
+        )
     )
     swipe: Slider = field(
         default_factory=lambda: Slider(
             start=0, end=100, step=1, value=50, title="swipe (% of the width)", name="swipe",
-            sizing_mode="stretch_width", margin=0,
+            sizing_mode="stretch_width", margin=0, stylesheets=[CONTROL],
         )
     )  # fmt: skip
 
 
 def _select(title: str, options: list[str] | None = None, value: str = "") -> Select:
     name = title.partition(" ")[0]
-    width = {"configuration": 290, "compare": 220, "pixels": 120, "wrong": 120, "dataset": 190}.get(name, 150)
-    return Select(title=title, options=options or [], value=value, name=name, width=width, margin=0)
+    width = {"configuration": 330, "compare": 330, "pixels": 120, "wrong": 120, "dataset": 190}.get(name, 150)
+    return Select(
+        title=title, options=options or [], value=value, name=name, width=width, margin=0, stylesheets=[CONTROL]
+    )
 
 
 def _spinner(title: str) -> Spinner:
-    return Spinner(title=title, low=0, step=1, name=title.split()[1], width=110, margin=0)
+    return Spinner(
+        title=title, low=0, step=1, name=title.split()[1], width=110, margin=0, stylesheets=[CONTROL], value=None
+    )
 
 
 def _button(label: str, name: str = "") -> Button:
-    return Button(label=label, name=name or label, width=110 if not name else 44, margin=0)
+    width = 110 if not name else 44
+    return Button(label=label, name=name or label, width=width, margin=0, stylesheets=[CONTROL])
+
+
+NO_PIXEL = "Click into a map, or set row and column, to see the costs and the patches of a pixel."
 
 
 class Panels:
@@ -121,14 +140,14 @@ class Panels:
         self.swiped = map_panel("swiped", self.frame, sources.swiped, dict(every), "")
         self.line = Span(location=0, dimension="height", line_color="white", line_width=3)
         self.swiped.plot.add_layout(self.line)
-        self.curve = curve_chart(sources.table, sources.point)
-        title = words("curve-title", "<h3>what R buys: error against density</h3>")
+        self.curve = curve_chart(sources.table, sources.second, sources.point)
+        title = words("curve-title", "<h3>error against invalid pixels</h3>")
         self.curve_box = Column(title, self.curve, sizing_mode="stretch_width", stylesheets=[WIDE], margin=0)
         self.costs, self.true = cost_chart(sources.curve, sources.marks)
         self.costs_box = Column(
             self.costs, words("cost-legend", COST_LEGEND), sizing_mode="stretch_width", visible=False
         )
-        self.patches = patch_chart("patches", sources.patches, {"patch": gray_mapper()}, 38, 47)
+        self.patches = patch_chart("patches", sources.patches, {"patch": gray_mapper()}, 38, 53)
         self.seen_scale = scales()["disparity"]
         self.seen = patch_chart("seen", sources.gray, {"gray": gray_mapper()}, 210, 112)
         self.seen.image(
@@ -138,9 +157,10 @@ class Panels:
         self.seen.rect(
             "mx", "my", "side", "side", source=sources.seen, fill_color=None, line_color="#D55E00", line_width=2
         )
+        self.charts = (self.curve, self.costs, self.patches, self.seen)
         self.told = words("told")
         self.about = words("about")
-        self.pixel = words("pixel", "Click into a picture, or set row and column.")
+        self.pixel = words("pixel", NO_PIXEL)
         self.products = words("products")
         self.problem = words("problem")
 
@@ -161,9 +181,12 @@ def connect(controls: Controls, sources: Sources, panels: Panels) -> list[Custom
     """Connect the callbacks that run in the browser: filter, swipe and frame; return the one that runs at the start."""
     base = {"slider": controls.R, "base": sources.base}
     keep = CustomJS(
-        args={**base, "kept": sources.kept, "table": sources.table, "point": sources.point, "told": panels.told},
+        args={
+            **base, "kept": sources.kept, "table": sources.table, "second": sources.second, "names": sources.names,
+            "point": sources.point, "told": panels.told,
+        },
         code=script("filter"),
-    )
+    )  # fmt: skip
     glyphs: dict[str, Any] = dict(zip(("disparity", "error", "confidence"), panels.swiped.glyphs, strict=True))
     swipe = CustomJS(
         args={
@@ -176,9 +199,14 @@ def connect(controls: Controls, sources: Sources, panels: Panels) -> list[Custom
     controls.swipe.js_on_change("value", swipe)
     controls.show.js_on_change("active", swipe)
     sources.base.js_on_change("data", keep, swipe)
-    sources.table.js_on_change("data", keep)
+    for figures in (sources.table, sources.second, sources.names):
+        figures.js_on_change("data", keep)
     sources.other.js_on_change("data", swipe)
     controls.whole.js_on_click(panels.frame.whole())
     controls.nearer.js_on_click(panels.frame.closer(1.5))
     controls.farther.js_on_click(panels.frame.closer(1 / 1.5))
-    return [keep, swipe]
+    controls.size.js_on_change("value", CustomJS(args={"sizes": SIZES}, code=_RESIZE))
+    return [keep, swipe, CustomJS(args={"charts": [*panels.charts]}, code=script("scheme"))]
+
+
+_RESIZE = "document.documentElement.style.setProperty('--map', sizes[cb_obj.value])"

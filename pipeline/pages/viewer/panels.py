@@ -29,26 +29,41 @@ from semidense.pipeline.figures.colours import (
     RED,
     UNKNOWN,
     confidence_colours,
+    confidence_share,
     disparity_colours,
 )
 
 LEGEND = """
 .scale, .key { white-space: nowrap; display: inline-flex; align-items: center; gap: .35rem; margin-right: .8rem; }
-.bar { display: inline-block; width: 5rem; flex: none; height: .75rem; border-radius: .2rem; }
-.swatch { width: .8rem; height: .8rem; border: 1px solid #57606a; border-radius: .15rem; }
-:host { min-width: 0; max-width: 100%; overflow-x: auto; font: .82rem/1.4 system-ui, sans-serif; color: #414a53; }
-h3 { font-size: .95rem; margin: 0 0 .25rem; color: #1b1f24; } h3 small { font-weight: 400; color: #57606a; }
+.bar { display: inline-block; flex: none; height: .75rem; border-radius: .2rem; }
+.swatch { width: .8rem; height: .8rem; border: 1px solid var(--quiet); border-radius: .15rem; }
+:host { min-width: 0; max-width: 100%; overflow-x: auto; font: .82rem/1.4 system-ui, sans-serif; color: var(--quiet); }
+h3 { font-size: .95rem; margin: 0 0 .25rem; color: var(--ink); }
 .bk-clearfix { display: block !important; width: 100%; min-width: 0; }
 .fact { margin-right: 1.1rem; white-space: nowrap; }
-.fact b { color: #1b1f24; font-size: .95rem; font-variant-numeric: tabular-nums; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; } caption { text-align: left; color: #57606a; }
-th, td { padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #d0d7de; }
+.fact b { color: var(--ink); font-size: .95rem; font-variant-numeric: tabular-nums; }
+.which { display: block; color: var(--ink); margin-top: .2rem; overflow-wrap: anywhere; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+caption { text-align: left; color: var(--quiet); }
+th, td { padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line); }
 .number { text-align: right; white-space: nowrap; } .scroll { overflow-x: auto; }
-pre { overflow-x: auto; background: #f3f5f8; padding: .6rem; }
-summary { cursor: pointer; color: #0072b2; }
+pre { overflow-x: auto; background: var(--soft); padding: .6rem; }
+summary { cursor: pointer; color: var(--accent); }
 """
+CONTROL = """
+:host { color: var(--ink); } label, .bk-slider-title { color: var(--ink); }
+.bk-input { background-color: var(--paper); color: var(--ink); border-color: var(--line); }
+.bk-btn, .bk-btn:hover { background-color: var(--soft); color: var(--ink); border-color: var(--line); }
+.bk-btn.bk-active { background-color: var(--accent); color: var(--paper); }
+.noUi-target { background: var(--soft); border-color: var(--line); box-shadow: none; }
+"""
+"""A style: controls in the page's colours, light or dark."""
 WIDE = ":host { grid-column: span 2; } @media (max-width: 44rem) { :host { grid-column: auto; } }"
 """A style: the panel takes two columns of the grid if there are several."""
+_FINE = 1000
+"""Colours of the confidence: enough for a step of 0.001 at its ends."""
+_HIGHEST = 270
+"""Greatest height of a chart of patches, px of the screen: a pixel is shown beside the maps."""
 _BLANK = np.full((1, 1), np.nan, np.float32)
 
 
@@ -61,6 +76,12 @@ def mapper(colours: Colormap, low: float, high: float) -> LinearColorMapper:
     """Return a colour scale that shows missing values in black."""
     palette = [to_hex(each) for each in colours(np.linspace(0, 1, 256))]
     return LinearColorMapper(palette=palette, low=low, high=high, nan_color=NONE)
+
+
+def confidence_mapper() -> LinearColorMapper:
+    """Return the colours of confidences: a straight scale whose colours follow their log-odds."""
+    colours = confidence_colours()(confidence_share(np.linspace(0, 1, _FINE)))
+    return LinearColorMapper(palette=[to_hex(each) for each in colours], low=0, high=1, nan_color=NONE)
 
 
 def error_mapper() -> LinearColorMapper:
@@ -149,7 +170,7 @@ def map_panel(
     """
     plot = figure(
         name=name, x_range=frame.x, y_range=frame.y, sizing_mode="scale_width", aspect_ratio=1.5, toolbar_location=None,
-        tools="pan,wheel_zoom,tap", active_drag="pan", active_scroll="wheel_zoom", min_border=0,
+        tools="pan,wheel_zoom", active_drag="pan", active_scroll="wheel_zoom", min_border=0,
         outline_line_color="#8a8a8a", background_fill_color="#000000", output_backend="canvas", lod_threshold=None,
     )  # fmt: skip
     plot.axis.visible = False
@@ -178,7 +199,8 @@ def chart(name: str, x: str, y: str, height: int = 340, **how: Any) -> Any:  # n
     """Return an empty chart with named axes."""
     plot = figure(
         name=name, sizing_mode="stretch_width", height=height, x_axis_label=x, y_axis_label=y,
-        tools="pan,wheel_zoom,reset", toolbar_location=None, active_scroll=None, **how,
+        tools="pan,wheel_zoom,reset", toolbar_location=None, active_scroll=None,
+        background_fill_color=None, border_fill_color=None, **how,
     )  # fmt: skip
     plot.axis.axis_label_text_font_style = "normal"
     plot.outline_line_color = None
@@ -186,18 +208,19 @@ def chart(name: str, x: str, y: str, height: int = 340, **how: Any) -> Any:  # n
     return plot
 
 
-def curve_chart(table: ColumnDataSource, point: ColumnDataSource) -> Any:  # noqa: ANN401
-    """Return the curve of error against invalid pixels, with the point of the R that is set."""
-    plot = chart("curve", "not kept: invalid pixels (%)", "error of the kept pixels (%)", 230)
+def curve_chart(table: ColumnDataSource, second: ColumnDataSource, point: ColumnDataSource) -> Any:  # noqa: ANN401
+    """Return the curve of error against invalid pixels, that of a second configuration, and the points at the R set."""
+    plot = chart("curve", "invalid: pixels that are not kept (%)", "bad: wrong of the kept (%)", 230)
+    plot.line("invalid", "bad", source=second, color=ORANGE, line_width=2, line_dash="dashed")
     plot.line("invalid", "bad", source=table, color=BLUE, line_width=2)
-    plot.scatter("invalid", "bad", source=table, color=BLUE, size=4)
-    plot.scatter("invalid", "bad", source=point, color=RED, line_color="black", size=14)
+    plot.scatter("invalid", "bad", source=table, color=BLUE, size=3)
+    plot.scatter("invalid", "bad", source=point, color="colour", line_color="black", size=14)
     label = {"text": "label", "text_align": "side", "y_offset": -10, "text_font_style": "bold"}
     plot.text("invalid", "bad", source=point, **label)
     plot.add_tools(
         HoverTool(
-            renderers=[plot.renderers[1]],
-            tooltips=[("R", "@R{0.00}"), ("not kept", "@invalid{0.0} %"), ("error", "@bad{0.00} %")],
+            renderers=[plot.renderers[2]],
+            tooltips=[("R", "@R{0.0000}"), ("invalid", "@invalid{0.0} %"), ("bad", "@bad{0.00} %")],
         )
     )
     plot.y_range.start = 0
@@ -207,7 +230,7 @@ def curve_chart(table: ColumnDataSource, point: ColumnDataSource) -> Any:  # noq
 
 def cost_chart(curve: ColumnDataSource, marks: ColumnDataSource) -> tuple[Any, Span]:
     """Return the chart of a pixel's costs, and the line at its true disparity."""
-    plot = chart("costs", "disparity (px)", "cost: log-odds of a mismatch")
+    plot = chart("costs", "disparity (px)", "cost: log-odds of a mismatch", 210)
     plot.line("d", "cost", source=curve, color=BLUE, line_width=2)
     plot.scatter("d", "cost", source=curve, color=BLUE, size=5)
     plot.scatter("d", "cost", source=marks, marker="marker", color="colour", line_color="black", size=16)
@@ -241,14 +264,15 @@ def patch_chart(
     """
     plot = figure(
         name=name, x_range=(0, width), y_range=(height, 0), sizing_mode="scale_width",
-        aspect_ratio=width / height, max_width=560, visible=False,
+        aspect_ratio=width / height, max_width=round(_HIGHEST * width / height), visible=False,
         tools="", toolbar_location=None, min_border=0, outline_line_color=None,
+        background_fill_color=None, border_fill_color=None,
     )  # fmt: skip
     plot.axis.visible = False
     plot.grid.visible = False
     for column, scale in colours.items():
         plot.image(image=column, x="x", y="y", dw="dw", dh="dh", color_mapper=scale, source=source)
-    plot.text("x", "y", text="label", source=source, y_offset=-4, text_font_size="12px", text_color="#1b1f24")
+    plot.text("x", "y", text="label", source=source, y_offset=-4, text_font_size="12px")
     plot.rect("mx", "my", "side", "side", source=source, fill_color=None, line_color=RED, line_width=2)
     return plot
 
@@ -264,6 +288,6 @@ def scales() -> dict[str, LinearColorMapper]:
     """Return fresh scales of a disparity, a confidence and an error."""
     return {
         "disparity": mapper(disparity_colours(), 0, 1),
-        "confidence": mapper(confidence_colours(), 0, 1),
+        "confidence": confidence_mapper(),
         "error": error_mapper(),
     }

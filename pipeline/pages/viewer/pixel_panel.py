@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.pipeline.pages.html import tag, text
-from semidense.pipeline.pages.viewer.models import Panels, Sources
+from semidense.pipeline.pages.viewer.models import NO_PIXEL, Panels, Sources
 from semidense.pipeline.pages.viewer.panels import MARKS
 from semidense.pipeline.pages.viewer.pixel import CostCurve, evaluation_patch, matching_patches
 from semidense.stages.evaluation.declaration import PATCH as EVALUATION_PATCH
 from semidense.stages.matching.declaration import PATCH as MATCHING_PATCH
 
-_GAP, _HEAD = 2, 4.6
+_GAP, _HEAD = 2, 6.6
 """Space between patches and above them, px of the patches."""
 
 
@@ -21,7 +21,7 @@ def clear_pixel(panels: Panels) -> None:
     """Show no pixel."""
     for chart in (panels.costs_box, panels.patches, panels.seen):
         chart.visible = False
-    panels.pixel.text = text("Click into a picture, or set row and column.")
+    panels.pixel.text = text(NO_PIXEL)
 
 
 def show_costs(sources: Sources, panels: Panels, curve: CostCurve, truth: float) -> None:

@@ -13,7 +13,7 @@ from semidense.pipeline.figures.colours import disparity_span, error_classes
 from semidense.pipeline.pages.html import confidence_legend, disparity_legend, error_legend, tag, text
 from semidense.pipeline.pages.scene_maps import SceneMaps
 from semidense.pipeline.pages.viewer.catalogue import CatalogueScene, Configuration, catalogue
-from semidense.pipeline.pages.viewer.models import Controls, Panels, Sources, connect
+from semidense.pipeline.pages.viewer.models import ERROR, FIGURES, SWIPED, Controls, Panels, Sources, connect
 from semidense.pipeline.pages.viewer.pixel import CostCurve
 from semidense.pipeline.pages.viewer.pixel_panel import (
     clear_pixel,
@@ -46,6 +46,7 @@ class Session:
         self.first = connect(self.controls, self.sources, self.panels)
         self.chosen: Configuration | None = None
         self.maps: SceneMaps | None = None
+        self.compared: SceneMaps | None = None
         self._opened: dict[str, dict[str, Any]] = {}
         self._filling = False
         self._listen()
@@ -66,6 +67,7 @@ class Session:
             (controls.x, self.show_pixel),
         ):
             control.on_change("value", self._unless_filling(then))
+        controls.close.on_click(self._forget_pixel)
         for panel in (*self.panels.maps.values(), self.panels.swiped):
             panel.plot.on_event("tap", self._tap)
 
@@ -119,7 +121,6 @@ class Session:
                 )
             return
         self._show_maps(self.maps)
-        self.show_figures()
         self.panels.products.text = provenance_table(self.chosen, self.store)
         self.choose_compared()
         self._forget_pixel()
@@ -166,7 +167,9 @@ class Session:
         for name, panel in self.panels.maps.items():
             panel.box.visible = there[name]
         self.controls.R.visible = self.panels.told.visible = maps.confidence is not None
-        self.panels.curve_box.visible = maps.tally is not None
+        for model in (self.panels.curve_box, self.controls.mask, self.controls.threshold):
+            model.visible = maps.tally is not None
+        self.controls.show.labels = [each for each in SWIPED if each != ERROR or maps.truth is not None]
 
     def _write_titles(self, maps: SceneMaps, span: tuple[float, float]) -> None:
         titles = {
@@ -193,15 +196,15 @@ class Session:
 
     def show_figures(self) -> None:
         """Put the figures at every R for the mask and threshold that are set into the table that the browser reads."""
-        tally = self.maps.tally if self.maps else None
-        mask, threshold = self.controls.mask.value, float(self.controls.threshold.value)
-        rows = tally.rows("", mask, threshold) if tally else []
-        self.sources.table.data = {
-            name: np.array([row.get(name, np.nan) for row in rows]) for name in ("R", "invalid", "bad", "avgerr", "rms")
-        }
+        controls = self.controls
+        self.sources.names.data = {"name": [text(controls.configuration.value), text(controls.compare.value)]}
+        for source, maps in ((self.sources.second, self.compared), (self.sources.table, self.maps)):
+            tally = maps.tally if maps else None
+            rows = tally.rows("", controls.mask.value, float(controls.threshold.value)) if tally else []
+            source.data = {name: np.array([row.get(name, np.nan) for row in rows]) for name in FIGURES}
 
     def choose_compared(self) -> None:
-        """Read the maps of the second configuration, if there is one."""
+        """Read the maps of the second configuration, if there is one, and show the figures of both."""
         name = self.controls.compare.value
         other = self._read(self._configuration(name)) if name != NOTHING else None
         shown = other is not None and other.disparity is not None and other.confidence is not None
@@ -210,6 +213,8 @@ class Session:
         if other is not None and shown:
             self.panels.swiped.title.text = tag("h3", text(f"left: {self.controls.configuration.value}; right: {name}"))
             self.sources.other.data = _columns(other)
+        self.compared = other if shown else None
+        self.show_figures()
 
     def _tap(self, event: Any) -> None:  # noqa: ANN401
         if self.maps is None:

@@ -5,8 +5,10 @@ from matplotlib.colors import Colormap
 from skimage.color import rgb2lab
 
 from semidense.pipeline.figures.colours import (
+    confidence_at,
     confidence_colours,
     confidence_rgb,
+    confidence_share,
     cost_colours,
     disparity_colours,
     disparity_rgb,
@@ -58,6 +60,13 @@ def test_disparities_get_the_colours_of_the_span_and_none_gets_black() -> None:
     assert rgb[0, :2].tolist() == [[0, 0, 0], [0, 0, 0]]
     np.testing.assert_allclose(rgb[0, 2:], [first, first], atol=1)
     np.testing.assert_allclose(rgb[1, [1, 3]], [last, last], atol=1)
+
+
+def test_the_middle_of_a_confidence_has_half_of_the_colours() -> None:
+    """By hand: ln 9 / ln 99 = 0.478, so 0.1 and 0.9 lie 0.239 beside the middle."""
+    places = confidence_share(np.array([0, 0.01, 0.1, 0.5, 0.9, 0.99, 1, np.nan]))
+    np.testing.assert_allclose(places, [0, 0, 0.261, 0.5, 0.739, 1, 1, np.nan], atol=5e-4)
+    np.testing.assert_allclose(confidence_at(places[1:6]), [0.01, 0.1, 0.5, 0.9, 0.99])
 
 
 def test_a_confidence_is_coloured_on_the_scale_from_0_to_1() -> None:

@@ -55,8 +55,8 @@ def test_variants_are_told_apart() -> None:
 
 def test_axes_say_quantity_mask_threshold_and_and_unit() -> None:
     axes = error_curve_figure(ROWS).axes[0]
-    assert axes.get_xlabel() == "invalid: nonocc pixels without a disparity (%)"
-    assert axes.get_ylabel() == "bad: reported nonocc pixels off by more than 1 px (%)"
+    assert axes.get_xlabel() == "invalid: nonocc pixels that are not kept (%)"
+    assert axes.get_ylabel() == "bad: kept nonocc pixels off by more than 1 px (%)"
     assert [text.get_text() for text in axes.texts] == ["R = 0.1", "R = 0.9"]
     assert axes.get_ylim()[0] == 0
 
@@ -69,7 +69,14 @@ def test_another_mask_and_threshold_can_be_drawn() -> None:
 def test_a_scene_is_taken_literally() -> None:
     figure = error_curve_figure([row("$x_", 0.1, 0, 8)], title="$y_")
     figure.draw_without_rendering()
-    assert figure.axes[0].get_legend().get_texts()[0].get_text() == "$x_"
+    assert figure.legends[0].get_texts()[0].get_text() == "$x_"
+
+
+def test_chosen_thresholds_are_written_and_another_matcher_is_named_as_one() -> None:
+    other = {"method": "SGM", "invalid": 20.0, "bad": 5.0}
+    figure = error_curve_figure(ROWS, marked=(0.5, 0.9), others=[other])
+    assert [text.get_text() for text in figure.axes[0].texts] == ["R = 0.9"]
+    assert figure.legends[0].get_texts()[-1].get_text() == "SGM (other matcher)"
 
 
 @pytest.mark.parametrize("rows", [pytest.param([], id="none"), pytest.param(ROWS[-1:], id="no-R")])

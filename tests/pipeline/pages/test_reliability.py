@@ -34,5 +34,9 @@ def test_the_diagram_says_what_it_shows() -> None:
     drawn = reliability_figure(reliability([tally([0.8] * 60, [True] * 60)]), title="T")
     drawn.draw_without_rendering()
     written = {text.get_text() for text in drawn.findobj(Text)}
-    assert {"confidence (0 to 1)", "right: all pixels off by at most 1 px (%)", "pixels (%)"} <= written
+    assert {
+        "confidence (0 to 1)",
+        "share of all pixels\noff by at most 1 px (0 to 1)",
+        "share of\npixels (0 to 1)",
+    } <= written
     assert any("calibration error 0.200" in text for text in written)

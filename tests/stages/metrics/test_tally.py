@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from semidense.stages.evaluation.filtering import keep_confident
 from semidense.stages.metrics.errors import MASKS, THRESHOLDS, Errors, raw_bad
-from semidense.stages.metrics.tally import STEPS, Block, Tally
+from semidense.stages.metrics.tally import FINE, STEPS, Block, Tally
 
 N = np.nan
 
@@ -59,3 +59,12 @@ def test_where_nothing_is_kept_there_is_no_error() -> None:
     row = Tally.of([unsure]).rows("s")[-1]
     assert row["invalid"] == 100
     assert not {"bad", "avgerr", "rms"} & set(row)
+
+
+def test_a_curve_has_points_where_most_pixels_are() -> None:
+    """Half of the pixels have a confidence above 0.99: hundredths alone would join them by one line."""
+    assert set(STEPS) <= set(FINE)
+    sure = (1 - np.logspace(-6, -2, 1000)).astype(np.float32).reshape(20, 50)
+    whole = Block(np.zeros((20, 50)), sure, np.zeros((20, 50)), sure > 0)
+    invalid = [row["invalid"] for row in Tally.of([whole]).rows("s")]
+    assert np.diff(invalid).max() < 5

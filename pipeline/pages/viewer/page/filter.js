@@ -13,17 +13,20 @@ kept.data.disparity = [shown]
 kept.data.error = [wrong]
 kept.change.emit()
 
-const at = table.data.R.findIndex((each) => Math.abs(each - R) < 1e-9)
-const known = at >= 0
-point.data.invalid = known ? [table.data.invalid[at]] : []
-point.data.bad = known ? [table.data.bad[at]] : []
-point.data.side = known ? [table.data.invalid[at] > 50 ? "right" : "left"] : []
-point.data.label = known ? [`R = ${R}`] : []
+// The figures at R, of the second configuration too if there is one.
+const place = ({data}) => data.R.findIndex((each) => Math.abs(each - R) < 1e-9)
+const found = [[table, place(table), "#D55E00", ""], [second, place(second), "#E69F00", "second-"]].filter((each) => each[1] >= 0)
+point.data.invalid = found.map(([{data}, at]) => data.invalid[at])
+point.data.bad = found.map(([{data}, at]) => data.bad[at])
+point.data.side = found.map(([{data}, at]) => data.invalid[at] > 50 ? "right" : "left")
+point.data.label = found.map((_, n) => n ? "" : `R = ${R}`)
+point.data.colour = found.map((each) => each[2])
 point.change.emit()
-const number = (name, digits) => Number.isFinite(table.data[name][at]) ? table.data[name][at].toFixed(digits) : "none"
 const fact = (name, value, id = "") => `<span class="fact">${name} <b id="${id}">${value}</b></span> `
+const figures = ([{data}, at, colour, id]) => [["bad", 2, "%"], ["invalid", 2, "%"], ["avgerr", 3, "px"], ["rms", 3, "px"]]
+  .map(([name, digits, unit]) => fact(name, Number.isFinite(data[name][at]) ? `${data[name][at].toFixed(digits)} ${unit}` : "none", id + name)).join("")
+const which = (n) => found.length > 1 ? `<span class="which">${names.data.name[n]}</span>` : ""
 const share = () => (100 * shown.filter((d) => Number.isFinite(d)).length / shown.length).toFixed(1)
-told.text = fact("R", R.toFixed(2)) + (known
-  ? fact("error of kept", `${number("bad", 2)} %`, "bad") + fact("not kept", `${number("invalid", 2)} %`, "invalid")
-    + fact("mean error", `${number("avgerr", 3)} px`, "avgerr") + fact("rms", `${number("rms", 3)} px`, "rms")
-  : fact("kept", `${share()} %`) + "no ground truth is cached")
+told.text = fact("R", R.toFixed(2)) + (found.length
+  ? found.map((each, n) => which(n) + figures(each)).join("")
+  : fact("kept", `${share()} % of all pixels`) + "no ground truth is cached")

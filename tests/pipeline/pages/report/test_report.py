@@ -17,6 +17,8 @@ from semidense.pipeline.results.result import Result
 from tests.tiny import SPEC, TEST_ONLY, TRAINED
 
 Invoke = Callable[..., Any]
+PARTS = ["What ran", "Networks", "Settings, versions and keys"]
+"""What is closed at the end of a report."""
 
 
 @pytest.fixture(scope="session")
@@ -30,9 +32,10 @@ def headings(page: str) -> list[str]:
 
 def test_it_has_every_part(page: str) -> None:
     assert headings(page) == [
-        *("What ran", "Figures", "Error against invalid pixels", "Confidence", "Scenes", "Networks"),
-        "Configuration and versions",
+        *("Pictures", "Figures", "Error against invalid pixels", "Confidence", "How it was made"),
     ]
+    closed = [each for each in re.findall(r"<summary>(.*?)</summary>", page) if each in PARTS]
+    assert closed == PARTS
 
 
 def test_nothing_is_loaded_from_anywhere(page: str) -> None:
@@ -69,7 +72,7 @@ def test_training_scenes_are_not_reported_on(page: str) -> None:
 def test_what_is_not_cached_is_left_out(trained_task: Task, own_cache: Path, tmp_path: Path) -> None:
     task = replace(trained_task, cache=own_cache, settings=[*trained_task.settings, "confidence.window=9"])
     page = report(task, tmp_path / "r.html").read_text()
-    assert headings(page) == ["What ran", "Scenes", "Networks", "Configuration and versions"]
+    assert headings(page) == ["Pictures", "How it was made"]
     assert "raw disparity, before filtering" in page
     assert "kept at R" not in page
 
@@ -86,6 +89,7 @@ def test_the_settings_are_told(trained_task: Task, tmp_path: Path) -> None:
     page = report(
         replace(trained_task, settings=[*trained_task.settings, "semidense.R=0.9"]), tmp_path / "r"
     ).read_text()
+    assert "--preset paper" in page
     assert "--set semidense.R=0.9" in page
 
 

@@ -41,8 +41,8 @@ def test_what_was_made_from_a_configuration_is_found(made: Handmade) -> None:
 def test_configurations_are_named_by_what_differs(made: Handmade) -> None:
     judge(made, np.zeros((60, 90), np.float32), 7)
     (scene,) = catalogue(made.store)
-    names = [each.name.split(" (")[0] for each in scene.configurations]
-    assert names == ["confidence.variant=7", "confidence.variant=0"]
+    names = [each.name.split(" - ")[0] for each in scene.configurations]
+    assert names == ["paper, confidence.variant=7", "paper, confidence.variant=0"]
     assert len({each.name for each in scene.configurations}) == 2
 
 

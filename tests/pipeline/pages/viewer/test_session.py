@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from semidense.cache import Store
+from semidense.stages.metrics.tally import FINE
 from tests.handmade import Handmade, handmade, judge
 
 pytest.importorskip("bokeh", reason="Bokeh is not installed: pip install -e .[dev]")
@@ -48,7 +49,7 @@ def test_a_mask_and_a_threshold_change_the_figures(session: Session) -> None:
     session.controls.threshold.value = "4"
     assert list(session.sources.table.data["bad"]) != before
     session.controls.mask.value = "all"
-    assert session.sources.table.data["R"].size == 101
+    assert session.sources.table.data["R"].size == len(FINE)
 
 
 def test_a_tap_outside_the_image_does_nothing(session: Session) -> None:
@@ -76,6 +77,8 @@ def test_what_is_not_cached_is_left_out(made: Handmade) -> None:
     session.controls.scene.value = next(name for name in names if "no confidence" in _first(session, name))
     assert [name for name, panel in session.panels.maps.items() if panel.box.visible] == ["left", "raw"]
     assert not session.controls.R.visible
+    assert not session.controls.mask.visible, "without a truth it would do nothing"
+    assert "error" not in session.controls.show.labels
     session._tap(SimpleNamespace(x=4.0, y=4.0))
     assert "no raw disparity" in session.panels.pixel.text
 

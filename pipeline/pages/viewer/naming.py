@@ -1,0 +1,86 @@
+"""Name a configuration as a person would: preset, mode, what sets it apart from the others, and when it was made."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from pydantic_core import PydanticUndefined, to_jsonable_python
+
+from semidense.cache import Entry
+from semidense.pipeline.plan.presets import PRESETS
+from semidense.pipeline.results.text import time_text, value_text
+from semidense.stages.catalog import STAGES
+
+_USES = {
+    preset: dict(each.removeprefix("use.").split("=") for each in settings if each.startswith("use."))
+    for preset, settings in PRESETS.items()
+}
+"""The stages that a preset exchanges: product -> stage."""
+_UNSAID = ("tiles", "mode")
+"""Parameters that are no setting, or said already."""
+_SHOWN = 3
+"""Settings in a name, at most."""
+Chain = Mapping[str, Entry]
+
+
+def names(chains: Sequence[Chain]) -> list[str]:
+    """Return a name for each configuration of a scene, no two alike.
+
+    A setting is in it if it is not the default and not the same in all configurations.
+    """
+    settings = [dict(_chosen(chain)) for chain in chains]
+    every = dict.fromkeys(name for each in settings for name in each if _in_all(name, chains))
+    differing = [name for name in every if len({each.get(name) for each in settings}) > 1]
+    return [
+        _name(chain, [f"{name}={each[name][:24]}" for name in differing if name in each])
+        for chain, each in zip(chains, settings, strict=True)
+    ]
+
+
+def _in_all(setting: str, chains: Sequence[Chain]) -> bool:
+    """Return whether all configurations have the product of a setting."""
+    return all(setting.partition(".")[0] in chain for chain in chains)
+
+
+def _name(chain: Chain, settings: list[str]) -> str:
+    mode = [str(chain["costvolume"].recipe.params.get("mode", ""))] if "costvolume" in chain else []
+    parts = [_preset(chain), *mode, *settings[:_SHOWN], "" if "confidence" in chain else "no confidence"]
+    end = next(iter(chain.values()))
+    return f"{', '.join(part for part in parts if part)} - {time_text(end.created)[:16]} ({end.key[:6]})"
+
+
+def _preset(chain: Chain) -> str:
+    """Return the preset whose stages made a configuration; empty if there is none."""
+    made = {product: _stage(product, chain[product].recipe.params) for product in _exchanged() if product in chain}
+    fitting = [preset for preset, uses in _USES.items() if all(made[each] == uses.get(each, each) for each in made)]
+    return next(iter(fitting), "")
+
+
+def _exchanged() -> list[str]:
+    return list(dict.fromkeys(product for uses in _USES.values() for product in uses))
+
+
+def _stage(product: str, params: Mapping[str, Any]) -> str:
+    """Return the stage of a preset that made a product: the one with the most of its settings in the record."""
+    candidates = [product, *(uses[product] for uses in _USES.values() if product in uses)]
+    return max(candidates, key=lambda name: _recorded(name, params))
+
+
+def _recorded(stage: str, params: Mapping[str, Any]) -> int:
+    fields = set(STAGES[stage].params.model_fields)
+    return len(fields) if fields <= set(params) else -1
+
+
+def _chosen(chain: Chain) -> Iterator[tuple[str, str]]:
+    """Yield the settings that are not the defaults, as text."""
+    for product, entry in chain.items():
+        if product in ("images", "truth"):
+            continue
+        defaults = _defaults(_stage(product, entry.recipe.params)) if product in STAGES else {}
+        for name, value in entry.recipe.params.items():
+            if name not in _UNSAID and defaults.get(name, PydanticUndefined) != value:
+                yield f"{product}.{name}", value_text(value)
+
+
+def _defaults(stage: str) -> dict[str, Any]:
+    fields = STAGES[stage].params.model_fields
+    return {name: to_jsonable_python(field.default, fallback=str) for name, field in fields.items()}

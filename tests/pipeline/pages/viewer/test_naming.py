@@ -1,0 +1,47 @@
+from types import SimpleNamespace
+from typing import Any
+
+from semidense.pipeline.pages.viewer.naming import names
+from semidense.stages.catalog import STAGES
+
+
+def entry(stage: str, key: str = "abcdef0123", **changed: object) -> Any:  # noqa: ANN401
+    """Return a record of a stage with its default settings, but for those that are changed."""
+    fields = STAGES[stage].params.model_fields
+    params = {name: field.default for name, field in fields.items()} | {"tiles": "32 rows"} | changed
+    return SimpleNamespace(key=key, created="2026-11-28T18:49:07", recipe=SimpleNamespace(params=params))
+
+
+PAPER = {
+    "confidence": entry("confidence"),
+    "disparity": entry("disparity"),
+    "costvolume": entry("costvolume", mode="exact"),
+}
+ROBUST = {
+    "confidence": entry("evidence_confidence"),
+    "disparity": entry("aggregated"),
+    "costvolume": entry("costvolume", mode="fast"),
+}
+
+
+def shown(*chains: dict[str, Any]) -> list[str]:
+    return [name.split(" - ")[0] for name in names(chains)]
+
+
+def test_preset_and_mode_come_first_and_the_time_last() -> None:
+    assert names([ROBUST]) == ["robust, fast - 2026-11-28 18:49 (abcdef)"]
+    assert shown(PAPER, ROBUST) == ["paper, exact", "robust, fast"], "defaults of exchanged stages are not told"
+
+
+def test_a_setting_that_differs_is_told() -> None:
+    wider = ROBUST | {"disparity": entry("aggregated", paths=16)}
+    assert shown(ROBUST, wider) == ["robust, fast", "robust, fast, disparity.paths=16"]
+    assert shown(wider, wider) == ["robust, fast", "robust, fast"], "what all share sets none apart"
+
+
+def test_a_mixture_is_no_preset() -> None:
+    assert shown(PAPER | {"disparity": entry("aggregated")}) == ["exact"]
+
+
+def test_a_map_without_a_confidence_says_so() -> None:
+    assert shown({"disparity": entry("disparity")}) == ["paper, no confidence"]
