@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from zarr.codecs import ZstdCodec
 
 from benchmarks.harness import Ratio, compare, report
-from semidense.cache.entries.draft import ZSTD_LEVEL
+from semidense.cache.entries.arrays import ZSTD_LEVEL
 from semidense.stages.disparity.aggregation.stage import compute_aggregated
 from semidense.stages.disparity.aggregation.strips import Volume, aggregate
 from semidense.stages.disparity.aggregation.winner import winner

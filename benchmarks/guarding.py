@@ -37,7 +37,7 @@ GUARDS = (
     "semidense.cache.entries.publish.remove_strays",
     "semidense.cache.entries.publish.seal",
     "semidense.cache.entries.publish.commit",
-    "semidense.cache.entries.draft.Draft._complete",
+    "semidense.cache.entries.draft.FolderDraft._complete",
     "semidense.cache.store.Store.claim",
     "semidense.cache.processes.lease.Lease.add",
 )

@@ -12,7 +12,7 @@
 array([0, 1, 4])
 """
 
-from semidense.cache.entries.draft import Draft
+from semidense.cache.entries.backend import Checkpoint, Claim, Draft, Lease
 from semidense.cache.entries.entry import Entry
 from semidense.cache.errors import (
     CacheError,
@@ -30,8 +30,6 @@ from semidense.cache.errors import (
 )
 from semidense.cache.keys.code import code_hash_of, code_parts, module_hash, require_imported_as_hashed
 from semidense.cache.keys.recipe import ABSENT, Change, Recipe, differences
-from semidense.cache.processes.lease import Lease
-from semidense.cache.processes.locks import Lock
 from semidense.cache.store import Store
 
 __all__ = [
@@ -39,6 +37,8 @@ __all__ = [
     "CacheError",
     "CacheUnavailable",
     "Change",
+    "Checkpoint",
+    "Claim",
     "DamagedArchive",
     "DamagedEntry",
     "Draft",
@@ -50,7 +50,6 @@ __all__ = [
     "InvalidKey",
     "InvalidRecipe",
     "Lease",
-    "Lock",
     "NonDeterministicStage",
     "Recipe",
     "SourceNotFound",

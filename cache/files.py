@@ -3,11 +3,13 @@
 import errno
 import hashlib
 import os
+import secrets
 import shutil
 import stat
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -123,6 +125,50 @@ def hash_file(path: Path) -> str:
 def make_read_only(path: Path) -> None:
     """Take away everybody's right to write."""
     path.chmod(stat.S_IMODE(path.stat().st_mode) & ~0o222)
+
+
+@dataclass(frozen=True)
+class StateFile:
+    """A file that is written as a whole, again and again."""
+
+    path: Path
+
+    def save(self, data: bytes) -> None:
+        """Replace the content; a reader sees the old one or the new one, never a part.
+
+        Raises:
+            CacheUnavailable: if the file system refuses.
+        """
+        temporary = self.path.with_name(f".{self.path.name}.{secrets.token_hex(4)}")
+        with writing(self.path):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                with temporary.open("xb") as file:
+                    file.write(data)
+                    file.flush()
+                    os.fsync(file.fileno())
+                temporary.replace(self.path)
+            finally:
+                remove(temporary)
+
+    def load(self) -> bytes | None:
+        """Return the content; None if there is no such file.
+
+        Raises:
+            CacheUnavailable: if the file system refuses.
+        """
+        with reading(self.path):
+            return self.path.read_bytes() if self.path.is_file() else None
+
+    def remove(self) -> None:
+        """Delete the file, and what a killed writer left beside it.
+
+        Raises:
+            CacheUnavailable: if the file system refuses.
+        """
+        with writing(self.path):
+            for file in (self.path, *self.path.parent.glob(f".{self.path.name}.*")):
+                file.unlink(missing_ok=True)
 
 
 def walk(folder: Path, prefix: str = "") -> Iterator[tuple[str, os.DirEntry[str]]]:

@@ -1,71 +1,86 @@
 """The cache as its users see it: find, require, open, begin."""
 
 import re
-from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from time import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from semidense.cache.document import plain_mapping
-from semidense.cache.entries import publish
-from semidense.cache.entries.check import Finding, Policy, inspect, inspect_data, read_record
-from semidense.cache.entries.draft import Draft, hold
+from semidense.cache.entries.backend import Backend, Checkpoint, Claim, Draft, Lease, Policy
 from semidense.cache.entries.entry import Entry
-from semidense.cache.entries.quarantine import set_aside_if_damaged
+from semidense.cache.entries.folder import FolderBackend
 from semidense.cache.errors import CacheUnavailable, DamagedEntry, EntryNotFound
-from semidense.cache.files import make_folder, remove, writing
 from semidense.cache.keys.recipe import Recipe, require_texts
-from semidense.cache.keys.sources import keep_sources, kept_source
 from semidense.cache.layout import Layout
-from semidense.cache.processes.lease import Lease, is_abandoned, leased, sweep_checkpoints, sweep_locks, take_lease
-from semidense.cache.processes.locks import Lock, holder, try_lock
 
+T = TypeVar("T")
 if TYPE_CHECKING:
     import xarray
     import zarr
     from numpy.typing import NDArray
 
 
-_URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/.*", re.ASCII)
+_URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):/+(.*)", re.ASCII)
+SCHEMES = ("s3", "gs", "az", "memory")
+"""Object stores that a cache can be in."""
 
 
 @dataclass(frozen=True, init=False)
 class Store:
-    """A folder of published results, by key.
+    """A folder, or a prefix of an object store, of published results by key.
 
-    Many processes and threads can use one folder at a time. A ``Store`` itself holds nothing but
-    the path and the policy, and can be sent to other processes.
+    Many processes and threads can use one at a time. A ``Store`` itself holds nothing but
+    the place and the policy, and can be sent to other processes.
 
     Attributes:
-        root: the folder, absolute; made on the first write.
-        verify: how much of an entry is checked before it is used. ``full``: every byte, once a
+        root: the folder, absolute, or the URL; made on the first write.
+        verify: how much of an entry in a folder is checked before it is used. ``full``: every byte, once a
             process for a file that does not change. ``size``: which files there are, and their
-            sizes.
+            sizes. Of an entry in an object store every byte is checked when it is read.
 
     Raises:
-        CacheUnavailable: if ``root`` is a URL: a cache is a folder.
-        ValueError: if ``verify`` is none of the three.
+        CacheUnavailable: if ``root`` is a URL of another kind than ``SCHEMES``.
+        ValueError: if ``verify`` is none of the two.
     """
 
-    root: Path
+    root: Path | str
     verify: Policy
 
-    def __init__(self, root: Path, verify: Policy = "full") -> None:
+    def __init__(self, root: Path | str, verify: Policy = "full") -> None:
         if verify not in ("full", "size"):
             raise ValueError(f"verify is {verify!r}: it must be full or size")
-        if _URL.fullmatch(str(root)):
-            raise CacheUnavailable(
-                f"{root} is a URL, and a cache is a folder: name a folder of this machine or a share"
-            )
-        object.__setattr__(self, "root", Path(root).absolute())
+        object.__setattr__(self, "root", _place(root))
         object.__setattr__(self, "verify", verify)
 
     @property
+    def backend(self) -> Backend:
+        """What the cache needs of its place."""
+        if isinstance(self.root, Path):
+            return FolderBackend(Layout(self.root))
+        from semidense.cache.objects.backend import ObjectBackend
+
+        return ObjectBackend(self.root)
+
+    @property
     def layout(self) -> Layout:
-        """Where everything is."""
-        return Layout(self.root)
+        """Where everything is in the folder.
+
+        Raises:
+            CacheUnavailable: if the cache is in an object store.
+        """
+        if isinstance(self.root, Path):
+            return Layout(self.root)
+        raise CacheUnavailable(f"{self.root} is an object store, and this needs a cache in a folder")
+
+    def exists(self) -> bool:
+        """Return whether a cache is there.
+
+        Raises:
+            CacheUnavailable: if the place refuses.
+        """
+        return self.backend.exists()
 
     def find(self, key: str) -> Entry | None:
         """Return the entry of ``key`` as its record tells; None if there is none, or its record is damaged.
@@ -77,7 +92,7 @@ class Store:
             CacheUnavailable: if the file system refuses.
         """
         try:
-            return read_record(self.layout, key)
+            return self.backend.record(key)
         except (EntryNotFound, DamagedEntry):
             return None
 
@@ -89,7 +104,7 @@ class Store:
             CacheUnavailable: if the file system refuses.
         """
         try:
-            inspect(self.layout, key, self.verify)
+            self._checked(key)
         except (EntryNotFound, DamagedEntry) as error:
             return str(error)
         return None
@@ -100,7 +115,7 @@ class Store:
         Raises:
             InvalidKey: if ``key`` is not one.
         """
-        return self.layout.record(key).is_file()
+        return self.backend.has(key)
 
     def look(self, key: str) -> tuple[Entry | None, str | None]:
         """Return what ``find`` does, and of an entry that is there what ``check`` does; its record is read once.
@@ -112,7 +127,7 @@ class Store:
         if (entry := self.find(key)) is None:
             return None, None
         try:
-            inspect_data(self.layout, entry, self.verify)
+            self.backend.compare(entry, self.verify)
         except DamagedEntry as error:
             return entry, str(error)
         return entry, None
@@ -126,7 +141,7 @@ class Store:
             InvalidKey: if ``key`` is not one.
             CacheUnavailable: if the file system refuses.
         """
-        return self._require(key).entry
+        return self._aside(key, lambda: self._checked(key))
 
     def open(self, key: str) -> "xarray.Dataset":
         """Return the entry's arrays, checked as ``require`` does, read from disk only when they are needed.
@@ -138,10 +153,10 @@ class Store:
         Raises:
             EntryNotFound, DamagedEntry, InvalidKey, CacheUnavailable: as ``require`` does.
         """
-        found = self._require(key)
+        entry, data = self._aside(key, lambda: self.backend.data(key, self.verify))
         from semidense.cache.entries.reader import open_dataset
 
-        return open_dataset(self.layout.entry(key), found)
+        return open_dataset(data, entry)
 
     def arrays(self, key: str) -> "dict[str, zarr.Array[Any]]":
         """Return the entry's arrays, checked as ``require`` does, without labels: for code that knows them.
@@ -149,10 +164,10 @@ class Store:
         Raises:
             EntryNotFound, DamagedEntry, InvalidKey, CacheUnavailable: as ``require`` does.
         """
-        found = self._require(key)
+        _, data = self._aside(key, lambda: self.backend.data(key, self.verify))
         from semidense.cache.entries.reader import open_group
 
-        return dict(open_group(self.layout.entry(key), found).arrays())
+        return dict(open_group(data).arrays())
 
     def read(self, key: str) -> "dict[str, NDArray[Any]]":
         """Return all arrays of the entry, in memory; checked as ``require`` does.
@@ -164,12 +179,17 @@ class Store:
 
         return {name: np.asarray(array[...]) for name, array in self.arrays(key).items()}
 
-    def _require(self, key: str) -> Finding:
+    def _checked(self, key: str) -> Entry:
+        entry = self.backend.record(key)
+        self.backend.compare(entry, self.verify)
+        return entry
+
+    def _aside(self, key: str, look: Callable[[], T]) -> T:
         """Look at an entry; move it aside if it is damaged."""
         try:
-            return inspect(self.layout, key, self.verify)
+            return look()
         except DamagedEntry:
-            set_aside_if_damaged(self.layout, key, self.verify)
+            self.backend.set_aside(key, self.verify)
             raise
 
     def begin(self, recipe: Recipe, label: Mapping[str, str], lease: Lease | None = None, maker: str = "") -> Draft:
@@ -187,14 +207,7 @@ class Store:
             CacheUnavailable: if the folder cannot be written.
         """
         require_texts("label", label)
-        self.layout.create()
-        name = (lease and lease.name) or hold(take_lease(self.layout))
-        path = self.layout.draft(name, recipe.key, maker)
-        draft = Draft(self.root, path, recipe, plain_mapping("label", label), time())
-        with writing(path):
-            make_folder(path)
-        publish.STEP_HOOK("begun")
-        return draft
+        return self.backend.begin(recipe, plain_mapping("label", label), lease, maker)
 
     def entries(self) -> Iterator[Entry]:
         """Yield every entry with a well-formed record, in the order of keys.
@@ -202,34 +215,40 @@ class Store:
         Raises:
             CacheUnavailable: if the folder is not a cache, or the file system refuses.
         """
-        self.layout.require_cache()
-        return (entry for key in self.layout.record_keys() if (entry := self.find(key)))
+        self.backend.require_cache()
+        return (entry for key in self.backend.record_keys() if (entry := self.find(key)))
 
     def history(self, label: Mapping[str, str]) -> list[Entry]:
         """Return the entries of exactly this label, newest first."""
         found = [entry for entry in self.entries() if entry.label == dict(label)]
         return sorted(found, key=lambda entry: (entry.created, entry.key), reverse=True)
 
-    def claim(self, key: str) -> Lock | None:
-        """Return the lock of making ``key``, None while another process or thread holds it; see ``claimant``.
+    def last_used(self) -> Callable[[str], float]:
+        """Return what tells when an entry was made or last used, in seconds since the epoch; 0 if it is gone."""
+        return self.backend.last_used()
+
+    def claim(self, key: str) -> Claim | None:
+        """Return the claim of making ``key``, None while another process or thread has it; see ``claimant``.
 
         It saves work that two would do twice; it ends with its process, however that ends.
 
         Raises:
             InvalidKey: if ``key`` is not one.
-            CacheUnavailable: if the folder cannot be written.
+            CacheUnavailable: if the cache cannot be written.
         """
-        path = self.layout.lock("making", key)
-        self.layout.create()
-        return try_lock(path)
+        return self.backend.claim(key)
 
     def claimant(self, key: str) -> str | None:
         """Return who is making ``key``, such as ``process 123 on host``; None if nobody says so."""
-        return holder(self.layout.lock("making", key))
+        return self.backend.claimant(key)
 
     def lease(self) -> AbstractContextManager[Lease]:
         """Return a context whose ``add(keys)`` keeps entries, there or to come, from being cleaned away."""
-        return leased(self.layout)
+        return self.backend.lease()
+
+    def checkpoint(self, key: str) -> Checkpoint:
+        """Return the place of the states of long work on ``key``."""
+        return self.backend.checkpoint(key)
 
     def keep_sources(self, code: Mapping[str, str]) -> None:
         """Keep the texts of modules beside the entries, so that a change of code can be told by function and line.
@@ -237,23 +256,31 @@ class Store:
         Args:
             code: hash by module name, as in a recipe.
         """
-        keep_sources(self.layout, code)
+        self.backend.keep_sources(code)
 
     def kept_source(self, code_hash: str) -> str | None:
         """Return the text of a module that was kept under the hash of its code; None if there is none."""
-        return kept_source(self.layout, code_hash)
+        return self.backend.kept_source(code_hash)
 
     def sweep_drafts(self) -> int:
         """Delete what dead runs left: drafts, which it counts, locks, done checkpoints.
 
+        In an object store this is left to a cleaning, which lists everything anyway.
+
         Raises:
-            CacheUnavailable: if the folder is not a cache, or the file system refuses.
+            CacheUnavailable: if the place holds somebody else's files, or refuses.
         """
-        self.layout.require_cache()
-        abandoned = [path for path in self.layout.things(self.layout.drafts) if is_abandoned(self.layout, path)]
-        for path in abandoned:
-            remove(path)
-        with suppress(CacheUnavailable):
-            sweep_locks(self.layout)
-            sweep_checkpoints(self.layout)
-        return len(abandoned)
+        return self.backend.sweep_drafts()
+
+
+def _place(root: Path | str) -> Path | str:
+    """Return a folder's absolute path, or the one spelling of a URL; a path has lost one of its slashes."""
+    match = _URL.fullmatch(str(root))
+    if match is None:
+        return Path(root).absolute()
+    if match[1].lower() not in SCHEMES or not match[2]:
+        raise CacheUnavailable(
+            f"{root} is no place for a cache: name a folder, or an object store as "
+            + ", ".join(f"{scheme}://NAME/PREFIX" for scheme in SCHEMES[:3])
+        )
+    return f"{match[1].lower()}://{match[2].rstrip('/')}"

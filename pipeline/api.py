@@ -28,7 +28,7 @@ CACHE_VARIABLE = "PIPELINE_CACHE"
 
 
 def open_store(folder: Path | str | None = None) -> Store:
-    """Return the cache in ``folder``; by default in ``$PIPELINE_CACHE``, else in the user's cache folder."""
+    """Return the cache in ``folder``, or at a URL; by default in ``$PIPELINE_CACHE`` or the user's cache folder."""
     from platformdirs import user_cache_path
 
     chosen = folder or os.environ.get(CACHE_VARIABLE) or user_cache_path("semidense-stereo", appauthor=False)
@@ -157,7 +157,8 @@ def run(
         upto: the product to stop at.
         forced: products to make again; the new result must equal the old.
         watch: told how it goes on.
-        scheduler: address of a Dask scheduler, ``tcp://...``; None for threads of this process.
+        scheduler: where tasks are carried out: ``tcp://HOST:PORT``, ``processes:N``, a scheduler file, or ``env``;
+            None for threads of this process.
         workers: threads; None for one a core.
         **options: ``scenes``, ``settings``, ``config``, ``train`` and ``cache``, as ``Task`` has them.
 

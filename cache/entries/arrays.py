@@ -1,22 +1,27 @@
-"""The files of arrays; and of arrays from elsewhere, that they are as ``Draft`` writes them, before any is decoded."""
+"""Create arrays and list their files; check that imported arrays have the format ``Draft`` writes."""
 
 import json
 import math
 import re
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semidense.cache.document import parse
+from semidense.cache.document import canonical, parse
 from semidense.cache.entries.entry import DATA, Manifest
 from semidense.cache.errors import InvalidArray
 
 if TYPE_CHECKING:
     import numpy as np
     import zarr
+    from numpy.typing import NDArray
 
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
+"""The names that arrays can have."""
+ZSTD_LEVEL = 1
+"""Higher levels cost more time than they save space on float maps and float16 volumes."""
 LARGEST_CHUNK = 1 << 32
 """Bytes of one decoded chunk: a reader holds at least one in memory."""
 _FIELDS = {
@@ -160,6 +165,70 @@ def require_dtype(name: str, dtype: str) -> "np.dtype[Any]":
     if kind.kind not in "biuf" or not kind.isnative or kind.itemsize > 8:
         raise InvalidArray(f"array {name!r}: {dtype!r} cannot be stored: use bool, an integer or a float type")
     return kind
+
+
+def require_fit(
+    stage: str,
+    others: Mapping[str, Mapping[str, int]],
+    name: str,
+    shape: Sequence[int],
+    chunks: Sequence[int],
+    dims: Sequence[str],
+) -> None:
+    """Refuse an array that could not be opened together with the others, given the lengths of their dimensions."""
+    where = f"array {name!r} of {stage}"
+    if not NAME.fullmatch(name) or name in others:
+        raise InvalidArray(f"{where}: the name is taken, or not made of letters, digits and _")
+    if not len(shape) == len(chunks) == len(dims) == len(set(dims)):
+        raise InvalidArray(f"{where}: shape {shape}, chunks {chunks} and dims {dims} must have one item a dimension")
+    if any(size < 0 for size in shape) or any(chunk < 1 for chunk in chunks):
+        raise InvalidArray(f"{where}: shape {shape} must not be negative, and chunks {chunks} must be positive")
+    sizes = {dim: size for other in others.values() for dim, size in other.items()}
+    for dim, size in zip(dims, shape, strict=True):
+        if sizes.get(dim, size) != size:
+            raise InvalidArray(f"{where}: {dim} has length {size}, in another array of the draft {sizes[dim]}")
+
+
+def new_array(
+    place: Any,  # noqa: ANN401 - a path, or a place in one of zarr's stores
+    shape: Sequence[int],
+    kind: "np.dtype[Any]",
+    chunks: Sequence[int],
+    dims: Sequence[str],
+    attrs: Mapping[str, Any],
+    fill_value: float | None,
+) -> "zarr.Array[Any]":
+    """Create an array of the one form that this cache writes."""
+    import numpy as np
+    import zarr
+    from zarr.codecs import ZstdCodec
+
+    return zarr.create_array(
+        place,
+        zarr_format=3,
+        shape=tuple(shape),
+        dtype=kind,
+        chunks=tuple(max(1, min(chunk, size)) for chunk, size in zip(chunks, shape, strict=True)),
+        filters=(),
+        compressors=(ZstdCodec(level=ZSTD_LEVEL, checksum=True),),
+        fill_value=fill_value if fill_value is not None else kind.type(np.nan if kind.kind == "f" else 0),
+        dimension_names=tuple(dims),
+        attributes=parse(canonical(attrs)),
+        config={"write_empty_chunks": True},
+    )
+
+
+def require_region(
+    where: str, array: "zarr.Array[Any]", region: tuple[slice, ...], data: "NDArray[Any]"
+) -> tuple[slice, ...]:
+    """Return the region with its bounds if it is made of whole chunks, and the data fit it."""
+    bounds = require_aligned(where, array, region)
+    expected = tuple(stop - start for start, stop in bounds)
+    if data.shape != expected or data.dtype != array.dtype:
+        raise InvalidArray(
+            f"{where}: the data are {data.dtype} {data.shape}, the region takes {array.dtype} {expected}"
+        )
+    return tuple(slice(*pair) for pair in bounds)
 
 
 def require_aligned(where: str, array: "zarr.Array[Any]", region: tuple[slice, ...]) -> list[tuple[int, int]]:

@@ -7,15 +7,13 @@ import time
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
 
+from semidense.cache.entries.backend import Policy
 from semidense.cache.entries.entry import MANIFEST, Entry, File, Manifest
 from semidense.cache.errors import DamagedEntry, EntryNotFound
 from semidense.cache.files import hash_file, in_threads, reading, walk
 from semidense.cache.layout import Layout
 
-Policy = Literal["full", "size"]
-"""``full``: every byte. ``size``: which files there are, and their sizes."""
 SETTLED = 0.1
 """Seconds after which a file's times tell every later change; they advance in steps of up to 10 ms."""
 THREADS_PAY = 1 << 20

@@ -1,23 +1,19 @@
-"""Work in progress: a folder of its own into which arrays are written, and which is then published whole."""
+"""Work in progress in a folder: one of its own into which arrays are written, and which is then published whole."""
 
 import json
-import re
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
-from semidense.cache.document import canonical, parse
 from semidense.cache.entries import publish
-from semidense.cache.entries.arrays import chunk_paths, require_aligned, require_dtype
+from semidense.cache.entries.arrays import NAME, chunk_paths, new_array, require_dtype, require_fit, require_region
+from semidense.cache.entries.backend import Draft
 from semidense.cache.entries.entry import DATA, Entry
 from semidense.cache.errors import IncompleteDraft, InvalidArray
 from semidense.cache.files import writing
-from semidense.cache.keys.recipe import Recipe
 from semidense.cache.layout import Layout
 from semidense.cache.processes.locks import Lock
 
@@ -25,9 +21,6 @@ if TYPE_CHECKING:
     import zarr
     from numpy.typing import NDArray
 
-ZSTD_LEVEL = 1
-"""Higher levels cost more time than they save space on float maps and float16 volumes."""
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 _own: dict[str, Lock] = {}
 """Leases of drafts that belong to no run, by their name: held until the draft is published or deleted."""
 
@@ -39,25 +32,16 @@ def hold(lease: Lock) -> str:
 
 
 @dataclass(frozen=True)
-class Draft:
-    """A result in the making, from ``Store.begin``; other processes and threads can write through a copy.
-
-    As a context manager it publishes at the end of the block, unless the block did, and leaves
-    nothing when the block fails. ``holds`` and ``published`` find what a writer did that was killed since.
+class FolderDraft(Draft):
+    """A draft in a folder of its own; ``Draft`` says what its methods do.
 
     Attributes:
         root: the cache's folder.
         path: the draft's own folder.
-        recipe: what the result is made from.
-        label: what people call it.
-        started: when it was begun, in seconds since the epoch.
     """
 
     root: Path
     path: Path
-    recipe: Recipe
-    label: Mapping[str, str]
-    started: float
 
     def create_array(
         self,
@@ -69,107 +53,28 @@ class Draft:
         attrs: Mapping[str, Any],
         fill_value: float | None = None,
     ) -> None:
-        """Add an empty array; coordinates are 1-d arrays named like their dimension.
-
-        Args:
-            name: letters, digits and ``_``.
-            shape: length of each dimension.
-            dtype: NumPy name of a bool, integer or float type in native byte order.
-            chunks: chunk length of each dimension; one longer than the array is cut to it.
-            dims: a name for each dimension; arrays that share one must agree on its length.
-            attrs: JSON only, such as ``units`` and ``long_name``.
-            fill_value: recorded, never read: NaN for floats and zero for others if not given.
-
-        Raises:
-            InvalidArray: if an argument is not as said here, or the name is taken.
-            InvalidRecipe: if ``attrs`` holds what JSON cannot.
-            CacheUnavailable: if the file system refuses.
-        """
-        import numpy as np
-        import zarr
-        from zarr.codecs import ZstdCodec
-
+        """Add an empty array, see ``Draft``."""
         kind = require_dtype(name, dtype)
         with self._writing():
-            self._require_fit(name, shape, chunks, dims)
+            require_fit(self.recipe.stage, self._sizes(), name, shape, chunks, dims)
             if not (self.path / DATA / "zarr.json").is_file():
                 self._group()
-            zarr.create_array(
-                self.path / DATA / name,
-                zarr_format=3,
-                shape=tuple(shape),
-                dtype=kind,
-                chunks=tuple(max(1, min(chunk, size)) for chunk, size in zip(chunks, shape, strict=True)),
-                filters=(),
-                compressors=(ZstdCodec(level=ZSTD_LEVEL, checksum=True),),
-                fill_value=fill_value if fill_value is not None else kind.type(np.nan if kind.kind == "f" else 0),
-                dimension_names=tuple(dims),
-                attributes=parse(canonical(attrs)),
-                config={"write_empty_chunks": True},
-            )
+            new_array(self.path / DATA / name, shape, kind, chunks, dims, attrs, fill_value)
         publish.STEP_HOOK("array created")
 
-    def _require_fit(
-        self,
-        name: str,
-        shape: Sequence[int],
-        chunks: Sequence[int],
-        dims: Sequence[str],
-    ) -> None:
-        """Refuse an array that could not be opened together with the others."""
-        where = f"array {name!r} of {self.recipe.stage}"
-        others = self._sizes()
-        if not _NAME.fullmatch(name) or name in others:
-            raise InvalidArray(f"{where}: the name is taken, or not made of letters, digits and _")
-        if not len(shape) == len(chunks) == len(dims) == len(set(dims)):
-            raise InvalidArray(
-                f"{where}: shape {shape}, chunks {chunks} and dims {dims} must have one item a dimension"
-            )
-        if any(size < 0 for size in shape) or any(chunk < 1 for chunk in chunks):
-            raise InvalidArray(f"{where}: shape {shape} must not be negative, and chunks {chunks} must be positive")
-        sizes = {dim: size for other in others.values() for dim, size in other.items()}
-        for dim, size in zip(dims, shape, strict=True):
-            if sizes.get(dim, size) != size:
-                raise InvalidArray(f"{where}: {dim} has length {size}, in another array of the draft {sizes[dim]}")
-
     def write(self, name: str, region: tuple[slice, ...], data: "NDArray[Any]") -> None:
-        """Write one region of an array, whole chunks only: a chunk has one writer, and none is lost.
-
-        Writing a region again replaces it, so that a task may be tried twice.
-
-        Args:
-            name: of an array made by ``create_array``.
-            region: a slice a dimension, without steps; it starts at a chunk's start and ends at a
-                chunk's or the array's end.
-            data: of exactly the region's shape and the array's dtype.
-
-        Raises:
-            InvalidArray: if there is no such array, or region or data are not as said here.
-            CacheUnavailable: if the file system refuses.
-        """
+        """Write one region of an array, see ``Draft``."""
         with self._writing():
             array = self._array(name)
-            where = f"array {name!r} of {self.recipe.stage}"
-            bounds = require_aligned(where, array, region)
-            expected = tuple(stop - start for start, stop in bounds)
-            if data.shape != expected or data.dtype != array.dtype:
-                raise InvalidArray(
-                    f"{where}: the data are {data.dtype} {data.shape}, the region takes {array.dtype} {expected}"
-                )
-            array[tuple(slice(*pair) for pair in bounds)] = data
+            array[require_region(f"array {name!r} of {self.recipe.stage}", array, region, data)] = data
         publish.STEP_HOOK("chunk written")
 
     def has_array(self, name: str) -> bool:
         """Return whether ``create_array`` made an array of this name."""
-        return bool(_NAME.fullmatch(name)) and self._about(name).is_file()
+        return bool(NAME.fullmatch(name)) and self._about(name).is_file()
 
     def holds(self, name: str, region: tuple[slice, ...] | None = None) -> bool:
-        """Return whether a region of an array was written, by whichever process; None: all of the array.
-
-        Args:
-            name: of an array, made or not.
-            region: as for ``write``.
-        """
+        """Return whether a region of an array was written, see ``Draft``."""
         if not self.has_array(name):
             return False
         about = json.loads(self._about(name).read_bytes())
@@ -177,31 +82,11 @@ class Draft:
         return all((self.path / DATA / name / chunk).is_file() for chunk in chunk_paths(shape, chunks, region))
 
     def published(self) -> Entry | None:
-        """Return the entry that the draft became; None if it was deleted, or is still there.
-
-        Where a publisher was killed between its last steps, they are done now.
-
-        Raises:
-            CacheUnavailable: if the file system refuses.
-        """
+        """Return the entry that the draft became, see ``Draft``."""
         return publish.resume(Layout(self.root), self.path, self.recipe.key)
 
     def publish(self, seconds: float, extras: Mapping[str, Any]) -> Entry:
-        """Make the draft an entry that everybody sees; the draft is gone afterwards, also when this fails.
-
-        Args:
-            seconds: what making it took.
-            extras: JSON only: further provenance, such as versions and command line.
-
-        Returns:
-            The entry: the one that another writer published first, if there is one of this key.
-
-        Raises:
-            IncompleteDraft: if a chunk was never written.
-            NonDeterministicStage: if another writer published other content under this key.
-            InvalidRecipe: if ``extras`` holds what JSON cannot.
-            CacheUnavailable: if the file system refuses.
-        """
+        """Make the draft an entry that everybody sees, see ``Draft``."""
         try:
             with self._writing():
                 paths = self._complete()
@@ -221,16 +106,9 @@ class Draft:
         if own := _own.pop(self.path.name.partition("-")[0], None):
             own.release()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if error is not None:
-            self.discard()
-        elif self.path.exists():
-            self.publish(time.time() - self.started, {})
+    def exists(self) -> bool:
+        """Return whether the draft was neither published nor deleted."""
+        return self.path.exists()
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -267,7 +145,7 @@ class Draft:
         """Open one array so that every chunk written becomes a file, also one that is all fill value."""
         import zarr
 
-        if not _NAME.fullmatch(name) or not (self.path / DATA / name).is_dir():
+        if not NAME.fullmatch(name) or not (self.path / DATA / name).is_dir():
             raise InvalidArray(f"{self.recipe.stage} has no array {name!r}: create it before writing")
         array = zarr.open_array(self.path / DATA / name, mode="r+", zarr_format=3)
         return array.with_config({"write_empty_chunks": True})  # open_array itself ignores this setting (zarr 3.1)

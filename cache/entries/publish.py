@@ -145,13 +145,17 @@ def _published(layout: Layout, draft: Path, entry: Entry) -> Entry | None:
     except DamagedEntry as error:
         set_aside(layout, entry.key, str(error))
         return None
-    _require_same(found.entry, entry)
+    require_same(found.entry, entry)
     remove(draft)
     return found.entry
 
 
-def _require_same(old: Entry, new: Entry) -> None:
-    """Refuse a second result of the same recipe that differs from the first."""
+def require_same(old: Entry, new: Entry) -> None:
+    """Refuse a second result of the same recipe that differs from the first.
+
+    Raises:
+        NonDeterministicStage: naming both.
+    """
     if old.digest != new.digest:
         raise NonDeterministicStage(
             f"{new.recipe.stage} gave two results from one recipe (key {new.key}): {old.digest} on {old.created}, "
@@ -213,7 +217,7 @@ def _link_record(layout: Layout, draft: Path, entry: Entry) -> Entry:
         record.hardlink_to(temporary)
     except FileExistsError:
         found = inspect(layout, entry.key, "full").entry
-        _require_same(found, entry)
+        require_same(found, entry)
         return found
     finally:
         remove(temporary)

@@ -4,7 +4,8 @@ import logging
 from contextlib import suppress
 from pathlib import Path
 
-from semidense.cache.entries.check import Policy, inspect
+from semidense.cache.entries.backend import Policy
+from semidense.cache.entries.check import inspect
 from semidense.cache.errors import CacheUnavailable, DamagedEntry, EntryNotFound
 from semidense.cache.files import make_folder, move_folder, writing
 from semidense.cache.layout import Layout

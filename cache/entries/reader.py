@@ -7,20 +7,57 @@ import zarr
 from zarr.storage import LocalStore
 
 from semidense.cache.entries import forks  # noqa: F401 - importing it makes reads in forked children safe
-from semidense.cache.entries.check import Finding
-from semidense.cache.entries.entry import DATA, Manifest
+from semidense.cache.entries.entry import DATA, Entry, File, Manifest
 from semidense.cache.errors import DamagedEntry
 
 if TYPE_CHECKING:
     import builtins
-    from collections.abc import AsyncIterator, Iterable
+    from collections.abc import AsyncIterator, Iterable, Mapping
 
     import xarray as xr
     from zarr.abc.store import ByteRequest
     from zarr.core.buffer import Buffer, BufferPrototype
 
 
-class EntryStore(LocalStore):
+def files_by_name(manifest: Manifest) -> dict[str, File]:
+    """Return the files of a manifest by the names that zarr has for them."""
+    return {file.path.removeprefix(f"{DATA}/"): file for file in manifest.files}
+
+
+class Listing:
+    """What a zarr store of one manifest says of its files without reading them."""
+
+    _sizes: "Mapping[str, int]"
+
+    async def getsize(self, key: str) -> int:
+        """Return the size of a file of the manifest; FileNotFoundError if the manifest lists none."""
+        if key not in self._sizes:
+            raise FileNotFoundError(key)
+        return self._sizes[key]
+
+    async def exists(self, key: str) -> bool:
+        """Return whether the manifest lists a file."""
+        return key in self._sizes
+
+    async def list(self) -> "AsyncIterator[str]":
+        """Yield the files of the manifest."""
+        for key in self._sizes:
+            yield key
+
+    async def list_prefix(self, prefix: str) -> "AsyncIterator[str]":
+        """Yield the files of the manifest whose path begins so."""
+        for key in self._sizes:
+            if key.startswith(prefix):
+                yield key
+
+    async def list_dir(self, prefix: str) -> "AsyncIterator[str]":
+        """Yield the names in a folder of the manifest."""
+        start = f"{prefix.rstrip('/')}/" if prefix else ""
+        for name in dict.fromkeys(key[len(start) :].partition("/")[0] for key in self._sizes if key.startswith(start)):
+            yield name
+
+
+class EntryStore(Listing, LocalStore):
     """A zarr store that holds the files of one manifest, no more and no less.
 
     To zarr a missing chunk is one full of fill values. Here it is an error: a file that the
@@ -30,7 +67,7 @@ class EntryStore(LocalStore):
     def __init__(self, root: Path, manifest: Manifest) -> None:
         super().__init__(root, read_only=True)
         self.manifest = manifest
-        self._sizes = {file.path.removeprefix(f"{DATA}/"): file.size for file in manifest.files}
+        self._sizes = {name: file.size for name, file in files_by_name(manifest).items()}
 
     def with_read_only(self, read_only: bool = False) -> "EntryStore":
         """Return this store again; it is never anything but read-only."""
@@ -66,33 +103,6 @@ class EntryStore(LocalStore):
         """Return parts of files of the manifest, each as ``get`` does."""
         return [await self.get(key, prototype, part) for key, part in key_ranges]
 
-    async def getsize(self, key: str) -> int:
-        """Return the size of a file of the manifest; FileNotFoundError if the manifest lists none."""
-        if key not in self._sizes:
-            raise FileNotFoundError(key)
-        return self._sizes[key]
-
-    async def exists(self, key: str) -> bool:
-        """Return whether the manifest lists a file."""
-        return key in self._sizes
-
-    async def list(self) -> "AsyncIterator[str]":
-        """Yield the files of the manifest."""
-        for key in self._sizes:
-            yield key
-
-    async def list_prefix(self, prefix: str) -> "AsyncIterator[str]":
-        """Yield the files of the manifest whose path begins so."""
-        for key in self._sizes:
-            if key.startswith(prefix):
-                yield key
-
-    async def list_dir(self, prefix: str) -> "AsyncIterator[str]":
-        """Yield the names in a folder of the manifest."""
-        start = f"{prefix.rstrip('/')}/" if prefix else ""
-        for name in dict.fromkeys(key[len(start) :].partition("/")[0] for key in self._sizes if key.startswith(start)):
-            yield name
-
     def _require(self, key: str, data: "Buffer | None", byte_range: "ByteRequest | None") -> "Buffer":
         """Refuse a file that is no longer the one that the manifest lists."""
         if data is None or (byte_range is None and len(data) != self._sizes[key]):
@@ -100,16 +110,14 @@ class EntryStore(LocalStore):
         return data
 
 
-def open_group(folder: Path, found: Finding) -> zarr.Group:
-    """Return an entry's arrays as a zarr group that can only be read."""
-    store: Any = EntryStore(folder / DATA, found.manifest)
+def open_group(store: Any) -> zarr.Group:  # noqa: ANN401 - zarr's type of stores is not ours to name
+    """Return the arrays of an entry's store as a zarr group that can only be read."""
     return zarr.open_group(store, mode="r", zarr_format=3, use_consolidated=False)
 
 
-def open_dataset(folder: Path, found: Finding) -> "xr.Dataset":
-    """Return an entry's arrays as a lazy dataset, values as stored, its provenance in ``attrs``."""
+def open_dataset(store: Any, entry: Entry) -> "xr.Dataset":  # noqa: ANN401
+    """Return the arrays of an entry's store as a lazy dataset, values as stored, its provenance in ``attrs``."""
     import xarray as xr
 
-    store: Any = EntryStore(folder / DATA, found.manifest)
     dataset: xr.Dataset = xr.open_zarr(store, consolidated=False, chunks={}, decode_cf=False, zarr_format=3)
-    return dataset.assign_attrs(found.entry.provenance())
+    return dataset.assign_attrs(entry.provenance())

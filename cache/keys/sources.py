@@ -8,7 +8,7 @@ import ast
 import difflib
 import os
 import secrets
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -45,12 +45,10 @@ def keep_sources(layout: Layout, code: Mapping[str, str]) -> None:
     """
     with suppress(CacheError):
         layout.create()
-    for module, code_hash in code.items():
+    for code_hash, text in source_texts(code, lambda code_hash: layout.source(code_hash).exists()):
         with suppress(CacheError, OSError):
             layout.require_cache()
             path = layout.source(code_hash)
-            if path.exists() or module_hash(module) != code_hash or (text := source_text(module)) is None:
-                continue
             make_folder(path.parent)
             temporary = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}")
             try:
@@ -60,13 +58,29 @@ def keep_sources(layout: Layout, code: Mapping[str, str]) -> None:
                 remove(temporary)
 
 
+def source_texts(code: Mapping[str, str], is_kept: Callable[[str], bool]) -> Iterator[tuple[str, str]]:
+    """Yield the hash and the text of each module of a recipe's code that is not kept, and still the one hashed."""
+    for module, code_hash in code.items():
+        with suppress(CacheError, OSError):
+            if is_kept(code_hash) or module_hash(module) != code_hash or (text := source_text(module)) is None:
+                continue
+            yield code_hash, text
+
+
 def kept_source(layout: Layout, code_hash: str) -> str | None:
     """Return the text that was kept under a hash; None if there is none, or it is not the one."""
-    with suppress(CacheError, OSError, ValueError, SyntaxError, RecursionError, MemoryError):
+    with suppress(CacheError, OSError):
         path = layout.source(code_hash)
         if path.is_file() and not path.is_symlink() and path.stat().st_size <= LONGEST:
-            text = path.read_text(encoding="utf-8")
-            return text if source_hash(text) == code_hash else None
+            return verified_source(code_hash, path.read_bytes())
+    return None
+
+
+def verified_source(code_hash: str, data: bytes) -> str | None:
+    """Return the text of bytes if their code has this hash; else None."""
+    with suppress(CacheError, ValueError, SyntaxError, RecursionError, MemoryError):
+        text = data.decode("utf-8")
+        return text if len(text) <= LONGEST and source_hash(text) == code_hash else None
     return None
 
 

@@ -21,7 +21,7 @@ _LINE = re.compile(r"^([0-9a-f]{64})\n", re.ASCII | re.MULTILINE)
 
 
 @dataclass(frozen=True)
-class Lease:
+class FolderLease:
     """The list of keys that a process uses; other processes that work for it can add to it.
 
     Attributes:
@@ -69,17 +69,21 @@ class Lease:
             with suppress(OSError):
                 os.utime(layout.record(key))  # a record's time says when its entry was last used
 
+    def is_seen(self) -> bool:
+        """Return whether this process sees the lease: whether it works on the same folder as the run."""
+        return self.path is None or self.path.is_file()
+
 
 @contextmanager
-def leased(layout: Layout) -> Iterator[Lease]:
+def leased(layout: Layout) -> Iterator[FolderLease]:
     """Open a lease and end it with the block."""
     try:
         mine = take_lease(layout)
     except CacheUnavailable:
-        yield Lease(layout.root, None)
+        yield FolderLease(layout.root, None)
         return
     try:
-        yield Lease(layout.root, mine.path)
+        yield FolderLease(layout.root, mine.path)
     finally:
         mine.release()
 

@@ -28,6 +28,7 @@ from semidense.cache.entries import publish
 from semidense.cache.entries.arrays import check_arrays
 from semidense.cache.entries.check import inspect
 from semidense.cache.entries.entry import MANIFEST, Entry, Manifest
+from semidense.cache.entries.folder import FolderBackend
 from semidense.cache.errors import CacheError, CacheUnavailable, DamagedArchive, DamagedEntry, NonDeterministicStage
 from semidense.cache.files import make_folder, remove, sync, writing
 from semidense.cache.store import Store
@@ -189,8 +190,8 @@ def _read(archive: tarfile.TarFile, member: tarfile.TarInfo) -> bytes:
 
 def _take_over(store: Store, archive: tarfile.TarFile, entry: Entry, manifest: Manifest) -> Imported:
     """Unpack an entry into a draft, check it, and publish it."""
-    before = store.check(entry.key) is None
-    draft = store.begin(entry.recipe, entry.label)
+    layout, before = store.layout, store.check(entry.key) is None
+    draft = FolderBackend(layout).begin(entry.recipe, entry.label, None, "")
     try:
         with writing(draft.path):
             for file in manifest.files:
@@ -199,7 +200,7 @@ def _take_over(store: Store, archive: tarfile.TarFile, entry: Entry, manifest: M
             sealed = publish.seal(draft.path, [file.path for file in manifest.files])
             if sealed != manifest:
                 raise _Refused(f"the files of {entry.key} are not those of its manifest")
-            published = publish.commit(store.layout, draft.path, entry)
+            published = publish.commit(layout, draft.path, entry)
     except NonDeterministicStage:
         return Imported(entry, "differs: yours is kept")
     finally:

@@ -6,11 +6,8 @@ killed in between, it leaves a draft of a dead process, which the next run sweep
 
 import json
 import os
-import time
-from collections.abc import Collection, Container, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Container, Iterable, Iterator
 from pathlib import Path
-from typing import Literal
 
 from semidense.cache.document import FORMAT_VERSION
 from semidense.cache.entries.check import read_plain
@@ -19,67 +16,12 @@ from semidense.cache.entries.quarantine import move_anything
 from semidense.cache.errors import CacheUnavailable
 from semidense.cache.files import make_folder, remove, walk, writing
 from semidense.cache.layout import Layout
-from semidense.cache.processes.lease import Lease, cleaning, in_use, is_abandoned, leased, remove_stale
+from semidense.cache.objects.requests import connect
+from semidense.cache.processes.lease import FolderLease, cleaning, in_use, is_abandoned, leased, remove_stale
 from semidense.cache.processes.locks import held, is_held
 from semidense.cache.store import Store
-
-Kind = Literal["entry", "draft", "orphan", "old format", "damaged record", "quarantine", "checkpoint", "stale lock"]
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Which sound entries may go; the leftovers of crashes always may.
-
-    Attributes:
-        keep: keys that stay whatever their age, such as those that a configuration reaches; None: no entry is
-            deleted for being unreachable, and age and size alone decide.
-        seconds: entries unused for longer may go; None: age does not matter.
-        bytes: entries go, longest unused first, until no more is left; None: size does not matter.
-        useless: keys of entries that can never be used again, with the reason: these go whatever else is asked for.
-    """
-
-    keep: frozenset[str] | None = None
-    seconds: float | None = None
-    bytes: int | None = None
-    useless: Mapping[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Item:
-    """Something that can be deleted.
-
-    Attributes:
-        kind: what it is.
-        name: the key of an entry, the name of anything else.
-        reason: why it can go, in a few words.
-        size: bytes on disk.
-        paths: what is deleted; what makes it visible comes first.
-        entry: of an entry, what its record tells.
-    """
-
-    kind: Kind
-    name: str
-    reason: str
-    size: int
-    paths: tuple[Path, ...]
-    entry: Entry | None = None
-
-
-@dataclass(frozen=True)
-class Survey:
-    """What can be deleted, and what else is there.
-
-    Attributes:
-        items: what can go.
-        kept: how many entries stay.
-        kept_bytes: their size.
-        used: how many of those stay only since a running process uses them.
-    """
-
-    items: tuple[Item, ...]
-    kept: int
-    kept_bytes: int
-    used: int
+from semidense.cache.upkeep import objects_gc
+from semidense.cache.upkeep.limits import Item, Kind, Limits, Survey, chosen
 
 
 def survey(store: Store, limits: Limits) -> Survey:
@@ -88,40 +30,16 @@ def survey(store: Store, limits: Limits) -> Survey:
     Raises:
         CacheUnavailable: if the file system refuses.
     """
+    if isinstance(store.root, str):
+        return objects_gc.survey(connect(store.root), limits)
     layout, used = store.layout, in_use(store.layout)
     entries = {entry.key: entry for entry in store.entries()}
-    chosen = dict(_chosen(layout, entries.values(), limits))
-    going = {key: reason for key, reason in chosen.items() if key not in used}
+    wanted = dict(chosen(entries.values(), limits, store.last_used()))
+    going = {key: reason for key, reason in wanted.items() if key not in used}
     items = [_entry_item(layout, entries[key], reason) for key, reason in going.items()]
     kept = [entry for key, entry in entries.items() if key not in going]
     items += _leftovers(layout, entries.keys(), used)
-    return Survey(tuple(items), len(kept), sum(entry.size for entry in kept), len(chosen) - len(going))
-
-
-def last_used(layout: Layout, key: str) -> float:
-    """Return when an entry was made or a run last used it, in seconds since the epoch; 0 if it is gone."""
-    try:
-        return layout.record(key).stat().st_mtime
-    except OSError:
-        return 0.0
-
-
-def _chosen(layout: Layout, entries: Collection[Entry], limits: Limits) -> Iterator[tuple[str, str]]:
-    """Yield the key of each entry that may go, with the reason, longest unused first."""
-    yield from ((entry.key, limits.useless[entry.key]) for entry in entries if entry.key in limits.useless)
-    if limits.keep is None and limits.seconds is None and limits.bytes is None:
-        return
-    now, entries = time.time(), [entry for entry in entries if entry.key not in limits.useless]
-    left = sum(entry.size for entry in entries)
-    free = [entry for entry in entries if limits.keep is None or entry.key not in limits.keep]
-    unreachable = "not reached by what is to be kept; " if limits.keep is not None else ""
-    for used, entry in sorted(((last_used(layout, each.key), each) for each in free), key=lambda pair: pair[0]):
-        old = limits.seconds is not None and now - used > limits.seconds
-        over = limits.bytes is not None and left > limits.bytes
-        if old or over or limits.seconds is limits.bytes is None:
-            left -= entry.size
-            why = "unused for long" if old else "the cache is too large" if over else ""
-            yield entry.key, f"{unreachable}{why}".removesuffix("; ")
+    return Survey(tuple(items), len(kept), sum(entry.size for entry in kept), len(wanted) - len(going))
 
 
 def _entry_item(layout: Layout, entry: Entry, reason: str) -> Item:
@@ -188,6 +106,8 @@ def collect(store: Store, items: Iterable[Item]) -> tuple[Item, ...]:
     Raises:
         CacheUnavailable: if the file system refuses; what was deleted by then stays deleted.
     """
+    if isinstance(store.root, str):
+        return objects_gc.collect(connect(store.root), tuple(items))
     layout = store.layout
     layout.require_cache()
     items = tuple(items)
@@ -197,7 +117,7 @@ def collect(store: Store, items: Iterable[Item]) -> tuple[Item, ...]:
     return tuple(done)
 
 
-def _delete(layout: Layout, lease: Lease, items: Iterable[Item]) -> list[Item]:
+def _delete(layout: Layout, lease: FolderLease, items: Iterable[Item]) -> list[Item]:
     """Move things out of sight and delete them; return those that nobody uses and that were still there."""
     trash = layout.trash(lease.name or "0" * 32)
     try:

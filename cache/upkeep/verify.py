@@ -6,10 +6,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from semidense.cache.entries.check import inspect, read_plain
+from semidense.cache.entries.check import read_plain
 from semidense.cache.errors import DamagedEntry, EntryNotFound
 from semidense.cache.files import THREADS, reading, walk
+from semidense.cache.objects.requests import Objects, connect
 from semidense.cache.store import Store
+from semidense.cache.upkeep.objects_gc import view
 
 Progress = Callable[[int, int], None]
 """Called with the number of entries done and their total."""
@@ -65,8 +67,8 @@ def verify(store: Store, keys: Iterable[str] | None = None, progress: Progress |
         InvalidKey: if one of ``keys`` is not a key.
         CacheUnavailable: if the file system refuses.
     """
-    store.layout.require_cache()
-    wanted = sorted(set(store.layout.record_keys() if keys is None else keys))
+    store.backend.require_cache()
+    wanted = sorted(set(store.backend.record_keys() if keys is None else keys))
     findings: dict[str, str | None] = {}
     with ThreadPoolExecutor(THREADS) as pool:
         for key, finding in zip(wanted, pool.map(lambda key: _finding(store, key, keys is None), wanted), strict=True):
@@ -80,7 +82,7 @@ def verify(store: Store, keys: Iterable[str] | None = None, progress: Progress |
 def _finding(store: Store, key: str, may_vanish: bool) -> str | None:
     """Return what is wrong with an entry, None if it is sound, nothing ("") if it is gone and may be."""
     try:
-        inspect(store.layout, key, "full", remember=False)
+        store.backend.verify(key)
     except EntryNotFound as error:
         return "" if may_vanish else str(error)
     except DamagedEntry as error:
@@ -89,7 +91,9 @@ def _finding(store: Store, key: str, may_vanish: bool) -> str | None:
 
 
 def _quarantined(store: Store) -> dict[str, str]:
-    """Return the reason of each thing in quarantine, by folder."""
+    """Return the reason of each thing in quarantine, by folder, or by key in an object store."""
+    if isinstance(store.root, str):
+        return {key: aside.reason for key, aside in view(connect(store.root)).asides.items()}
     reasons = {}
     for path in store.layout.things(store.layout.quarantine):
         reasons[path.name] = "unknown: its reason was never written"
@@ -102,16 +106,32 @@ def size(store: Store) -> Sizes:
     """Add up the bytes of a cache, by what they are; a cache that does not exist has none.
 
     Raises:
-        CacheUnavailable: if the file system refuses.
+        CacheUnavailable: if the place refuses.
     """
     stages: dict[str, int] = {}
     recorded = set()
     for entry in store.entries():
         recorded.add(entry.key)
         stages[entry.recipe.stage] = stages.get(entry.recipe.stage, 0) + entry.size
+    if isinstance(store.root, str):
+        return _sizes_of_objects(connect(store.root), stages)
     layout = store.layout
     orphans = sum(_bytes(layout.entry(key)) for key in layout.entry_keys() if key not in recorded)
     return Sizes(stages, _bytes(layout.quarantine), _bytes(layout.drafts), orphans, _bytes(layout.root))
+
+
+def _sizes_of_objects(objects: Objects, stages: Mapping[str, int]) -> Sizes:
+    found = view(objects)
+    drafts = {each.path.removeprefix("drafts/") for each in objects.below("drafts")}
+    asides = {aside.place for aside in found.asides.values()}
+    unpublished = {place: data.size for place, data in found.places.items() if place not in found.referred}
+    return Sizes(
+        stages,
+        quarantine=sum(data.size for place, data in found.places.items() if place in asides),
+        drafts=sum(size for place, size in unpublished.items() if place in drafts),
+        orphans=sum(size for place, size in unpublished.items() if place not in drafts),
+        total=sum(each.size for each in objects.below("")),
+    )
 
 
 def _bytes(path: Path) -> int:

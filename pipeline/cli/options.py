@@ -45,7 +45,11 @@ ConfigOption = Annotated[
 ]
 CacheOption = Annotated[
     Path | None,
-    typer.Option("--cache", help="Folder of the cache [default: $PIPELINE_CACHE, else your user cache folder]."),
+    typer.Option(
+        "--cache",
+        help="Folder of the cache, or a URL: s3://, gs:// or az:// [default: $PIPELINE_CACHE, else your user cache "
+        "folder].",
+    ),
 ]
 TrainOption = Annotated[
     bool, typer.Option("--train", help="Train the networks instead of using the weights that come with the package.")
@@ -63,7 +67,9 @@ OutputOption = Annotated[
 SchedulerOption = Annotated[
     str | None,
     typer.Option(
-        "--scheduler", help="Compute on this Dask cluster, tcp://HOST:PORT; its workers must see the same cache folder."
+        "--scheduler",
+        help="Compute on a Dask cluster: tcp://HOST:PORT, a scheduler file, processes:N for N processes of this "
+        "machine, or env for $DASK_SCHEDULER_ADDRESS. Its workers must see the same cache.",
     ),
 ]
 WorkersOption = Annotated[

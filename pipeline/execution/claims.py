@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 
-from semidense.cache import Lease, Lock, Store
+from semidense.cache import Claim, Lease, Store
 from semidense.pipeline.plan.errors import PipelineError
 
 SHORTEST, LONGEST = 0.01, 0.25
@@ -52,7 +52,7 @@ class LocalClaims(Claims):
     def __init__(self, lease: Lease, store: Store, threads: int) -> None:
         super().__init__(lease)
         self._store, self._threads = store, threads
-        self._claimed: dict[str, Lock] = {}
+        self._claimed: dict[str, Claim] = {}
         self._waiting = 0
         self._closed = threading.Event()
         self._lock = threading.Lock()
@@ -89,7 +89,7 @@ class LocalClaims(Claims):
             self._waiting += 1
             return True
 
-    def _wait(self, key: str, waiting: Callable[[str], None]) -> Lock:
+    def _wait(self, key: str, waiting: Callable[[str], None]) -> Claim:
         pause, told = SHORTEST, False
         while (claim := self._store.claim(key)) is None:
             if self._closed.wait(pause):

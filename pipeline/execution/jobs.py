@@ -11,7 +11,7 @@ import numpy as np
 
 from semidense.cache import Draft, Store
 from semidense.pipeline.execution.claims import Claims
-from semidense.pipeline.execution.proof import require_same
+from semidense.pipeline.execution.cluster.proof import require_same
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.plan.errors import StageFailed, StageRefused, told_of_stage
 from semidense.pipeline.plan.plan import Made

@@ -76,6 +76,10 @@ class ProgressWatch:
             self._rows, self._finished = {}, 0
             self._bar.reset(self._whole, total=len(plan.todo()), note="", visible=True)
 
+    def deployed(self, told: str) -> None:
+        """Print a line about the cluster: its workers, and where its dashboard is."""
+        self._console.print(told, highlight=False, soft_wrap=True, markup=False)
+
     def begun(self, step: Step, draft: Draft, tiles: int) -> None:
         """Name the product beside the bar."""
         with self._lock:

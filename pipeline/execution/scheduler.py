@@ -12,9 +12,9 @@ from uuid import uuid4
 from semidense.cache import CacheUnavailable, Lease, Store
 from semidense.pipeline.execution import tasks
 from semidense.pipeline.execution.claims import Claims, LocalClaims
-from semidense.pipeline.execution.cluster import SETTLE_SECONDS, Tasks, run_on_cluster
+from semidense.pipeline.execution.cluster.proof import runner_code
+from semidense.pipeline.execution.cluster.running import SETTLE_SECONDS, Tasks, run_on_cluster
 from semidense.pipeline.execution.jobs import Context
-from semidense.pipeline.execution.proof import runner_code
 from semidense.pipeline.execution.tiles import cut_rows
 from semidense.pipeline.execution.watch import Unwatched, Watch
 from semidense.pipeline.plan.plan import Made, Plan, Planned
@@ -37,7 +37,7 @@ def execute(
         store: the same cache.
         watch: told how it goes on; on a cluster only of products that are done.
         extras: stored beside each result.
-        scheduler: address of a Dask scheduler, ``tcp://...``; None for threads of this process.
+        scheduler: where the tasks are carried out, see ``deployment.FORMS``; None for threads of this process.
         workers: threads; None for one a core.
         lease: that the plan's hits were added to; None if nobody cleans the cache meanwhile.
 
@@ -52,7 +52,9 @@ def execute(
     with nullcontext(lease) if lease else store.lease() as held:
         if scheduler:
             context = Context(store, Unwatched(), extras, Claims(held), runner=runner_code())
-            return run_on_cluster(lambda: _graph(plan, context), held, watch, scheduler)
+            code = {name: each for planned in plan.todo() for name, each in planned.step.code.items()}
+            needed = {**code, **(context.runner or {})}
+            return run_on_cluster(lambda: _graph(plan, context), needed, store, held, watch, scheduler)
         threads = workers or os.cpu_count() or 1
         return _on_threads(plan, Context(store, watch, extras, LocalClaims(held, store, threads)), threads)
 

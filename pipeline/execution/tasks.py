@@ -171,7 +171,7 @@ def _monitor(context: Context, draft: Draft, step: Step) -> tuple[Checkpoints, .
     def report(done: int, total: int, note: str) -> None:
         context.watch.advanced(step, done, total, note)
 
-    return (Checkpoints(context.store.root, draft.recipe.key, report),) if step.stage.monitored else ()
+    return (Checkpoints(context.store.checkpoint(draft.recipe.key), report),) if step.stage.monitored else ()
 
 
 def publish(context: Context, job: Job, spans: Sequence[Span | None]) -> Made:
@@ -186,7 +186,7 @@ def publish(context: Context, job: Job, spans: Sequence[Span | None]) -> Made:
             try:
                 context.admit(job.step)
                 entry = _publish(job.draft, seconds, _extras(context, job.step))
-                Checkpoints(context.store.root, entry.key).remove()
+                context.store.checkpoint(entry.key).remove()
             finally:
                 context.claims.release(job.draft.recipe.key)
         made = Made(job.step, entry.key, entry.digest, seconds, reused=False)

@@ -13,6 +13,9 @@ class Watch(Protocol):
     def planned(self, plan: Plan, store: Store) -> None:
         """A run begins: it will make what the plan lacks."""
 
+    def deployed(self, told: str) -> None:
+        """The workers of a cluster are there; ``told`` is one line about them."""
+
     def begun(self, step: Step, draft: Draft, tiles: int) -> None:
         """A product is being made in ``draft``, in so many tiles."""
 
@@ -30,6 +33,9 @@ class Unwatched:
     """A watch for workers in other processes: it sees nothing."""
 
     def planned(self, plan: Plan, store: Store) -> None:
+        """See nothing."""
+
+    def deployed(self, told: str) -> None:
         """See nothing."""
 
     def begun(self, step: Step, draft: Draft, tiles: int) -> None:

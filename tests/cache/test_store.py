@@ -290,11 +290,19 @@ def test_a_tag_that_a_full_disk_cut_short_is_written_again(store: Store, make: C
     assert [path.name for path in store.root.glob("CACHEDIR*")] == ["CACHEDIR.TAG"]
 
 
-@pytest.mark.parametrize("url", ["s3://bucket/x", "gs://bucket", "https://example.org/cache", "file:///tmp/x"])
-def test_a_url_is_refused_in_one_line(url: str) -> None:
+@pytest.mark.parametrize("url", ["https://example.org/cache", "file:///tmp/x", "ftp://a/b", "s3://"])
+def test_a_url_of_another_kind_is_refused_in_one_line(url: str) -> None:
     for root in (url, Path(url)):
-        with pytest.raises(CacheUnavailable, match=r"^[a-z0-9]+:/[^\n]+ is a URL, and a cache is a folder[^\n]+$"):
-            Store(root)  # type: ignore[arg-type]
+        with pytest.raises(
+            CacheUnavailable,
+            match=r"^[a-z0-9]+:/[^\n]* is no place for a cache: name a folder, or an object store as s3://[^\n]+$",
+        ):
+            Store(root)
+
+
+@pytest.mark.parametrize("root", ["s3://bucket/x", "S3://bucket/x/", Path("s3://bucket/x")])
+def test_a_url_has_one_spelling_also_where_a_path_lost_a_slash(root: Path | str) -> None:
+    assert Store(root).root == "s3://bucket/x"
 
 
 def test_every_look_at_opened_files_goes_through_the_manifest(

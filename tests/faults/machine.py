@@ -13,7 +13,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_sta
 
 from semidense.cache import Store
 from semidense.cache.files import remove
-from semidense.cache.upkeep.gc import Limits, collect, survey
+from semidense.cache.upkeep.gc import collect, survey
+from semidense.cache.upkeep.limits import Limits
 from semidense.cache.upkeep.verify import verify
 from tests.faults import world
 from tests.faults.damage import DAMAGE, SAME_SIZE, unlock

@@ -16,7 +16,8 @@ from typing import Any
 
 from semidense.cache import Store
 from semidense.cache.entries import publish
-from semidense.cache.upkeep.gc import Limits, collect, survey
+from semidense.cache.upkeep.gc import collect, survey
+from semidense.cache.upkeep.limits import Limits
 from semidense.cache.upkeep.verify import verify
 from semidense.pipeline.execution.retry import attempt
 from semidense.pipeline.execution.watch import Unwatched

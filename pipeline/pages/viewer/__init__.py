@@ -23,7 +23,7 @@ def view(cache: Path | str | None = None, *, port: int = 5006, show: bool = True
     if find_spec("bokeh") is None:
         raise UsageError(INSTALL)
     store = open_store(cache)
-    if not store.root.is_dir():
+    if not store.exists():
         raise UsageError(
             f"{store.root}: no cache is there; make one with `pipeline match` or `run`, or name another: --cache"
         )

@@ -194,11 +194,11 @@ def test_a_run_whose_publisher_was_killed_publishes_all_the_same(
         filled(draft)
         run_script(
             """
-from semidense.cache import Lease
+from semidense.cache.processes.lease import FolderLease
 def work():
     root, path, step = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
     publish.STEP_HOOK = lambda done: die() if done == step else None
-    Store(root).begin(recipe, {}, Lease(root, path)).publish(1, {})
+    Store(root).begin(recipe, {}, FolderLease(root, path)).publish(1, {})
 assert code(in_child(work)) == -signal.SIGKILL
 """,
             store.root,

@@ -7,7 +7,8 @@ import pytest
 
 from semidense.cache import CacheUnavailable, Entry, Recipe, Store
 from semidense.cache.files import walk
-from semidense.cache.upkeep.gc import Limits, collect, survey
+from semidense.cache.upkeep.gc import collect, survey
+from semidense.cache.upkeep.limits import Limits
 from tests.faults.damage import DAMAGE, unlock
 
 Make = Callable[..., Entry]

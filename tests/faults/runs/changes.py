@@ -12,7 +12,8 @@ from PIL import Image
 
 from semidense.cache import CacheUnavailable, NonDeterministicStage, Recipe, Store
 from semidense.cache.entries import publish
-from semidense.cache.upkeep.gc import Limits, collect, survey
+from semidense.cache.upkeep.gc import collect, survey
+from semidense.cache.upkeep.limits import Limits
 from semidense.pipeline import api
 from semidense.pipeline.api import Task
 from semidense.pipeline.plan.errors import StageRefused
@@ -33,7 +34,7 @@ ACTS = (
     ("hash edit look", 0),
 )
 """What happens to a module, in order, and how often a hash is to be refused."""
-URLS = ("s3://bucket/x", "gs://bucket", "https://example.org/c", "file:///tmp/x", "az://a/b", "s3:/bucket", "HTTP://x")
+URLS = ("https://example.org/c", "file:///tmp/x", "HTTP://x", "ftp://a/b", "s3:/", "gs://", "abc+d:/x")
 
 
 def scene_folder(folder: Path, calib: bytes = CALIB) -> Path:
@@ -197,7 +198,7 @@ def urls(scale: float) -> Tally:
     tally = Tally()
     for url in URLS:
         for work in (lambda u=url: api.open_store(u), lambda u=url: Store(Path(u))):
-            _refused(tally, url, work, "is a URL")
+            _refused(tally, url, work, "is no place for a cache")
     return tally
 
 

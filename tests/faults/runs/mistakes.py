@@ -31,7 +31,7 @@ COMMANDS = (
     "{run} status {spec} --config /dev/zero",
     "{run} status {spec} --config {pipe}",
     "{run} status middlebury:/proc",
-    "{run} status {spec} --cache s3://bucket/x",
+    "{run} status {spec} --cache ftp://bucket/x",
     "{run} run {spec} --upto images --scheduler tcp://127.0.0.1:9",
     "{run} --help > /dev/full",
     "{run} status {spec} --json > /dev/full",

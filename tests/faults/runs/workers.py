@@ -16,7 +16,8 @@ from typing import Any
 from semidense.cache import Store
 from semidense.pipeline import api
 from semidense.pipeline.api import Task
-from semidense.pipeline.execution import cluster as clusters
+from semidense.pipeline.execution.cluster import deployment
+from semidense.pipeline.execution.cluster import running as clusters
 from semidense.pipeline.execution.retry import attempt
 from semidense.pipeline.execution.watch import Unwatched
 from semidense.pipeline.plan.errors import UsageError
@@ -232,16 +233,16 @@ def _refused(tally: Tally, store: Store, graph: Any, address: str, words: str, w
 
 def _no_workers(tally: Tally) -> None:
     """Run where no worker ever is, and where no scheduler is."""
-    patience, answer = clusters.PATIENCE, clusters.ANSWER
+    patience, answer = clusters.PATIENCE, deployment.ANSWER
     clusters.PATIENCE = 1.5
     try:
         with world.folder() as root, _cluster(0) as address:
             tally.injected += 1
             _refused(tally, Store(root), slow.scenes(1), address, "no worker has been there", "no workers")
-        clusters.ANSWER = 1.5  # nobody listens at these addresses, however long one waits
+        deployment.ANSWER = 1.5  # nobody listens at these addresses, however long one waits
         _no_schedulers(tally)
     finally:
-        clusters.PATIENCE, clusters.ANSWER = patience, answer
+        clusters.PATIENCE, deployment.ANSWER = patience, answer
 
 
 def _no_schedulers(tally: Tally) -> None:

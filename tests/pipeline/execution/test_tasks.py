@@ -6,7 +6,8 @@ import cloudpickle
 import numpy as np
 import pytest
 
-from semidense.cache import CacheUnavailable, Draft, Lease, Store
+from semidense.cache import CacheUnavailable, Draft, Store
+from semidense.cache.processes.lease import FolderLease
 from semidense.datasets import DatasetError
 from semidense.pipeline.execution import tasks
 from semidense.pipeline.execution.checkpoints import Checkpoints
@@ -46,7 +47,7 @@ def seen() -> Seen:
 
 @pytest.fixture
 def context(store: Store, seen: Seen) -> Context:
-    return Context(store, seen, {"by": "test"}, Claims(Lease(store.root, None)))
+    return Context(store, seen, {"by": "test"}, Claims(FolderLease(store.layout.root, None)))
 
 
 def whole(context: Context, each: Step, *inputs: Made, forced: bool = False) -> Made:
@@ -114,7 +115,7 @@ def test_a_monitored_stage_reports_and_its_checkpoint_is_gone_at_the_end(context
     trained = replace(SUM, inputs=(), compute="tests.pipeline.toy:train_toy", monitored=True)
     job = tasks.begin(context, step(trained), [], False, 1)
     assert job.draft is not None
-    checkpoint = Checkpoints(context.store.root, job.draft.recipe.key)
+    checkpoint = Checkpoints(context.store.checkpoint(job.draft.recipe.key))
     tasks.make_whole(context, job)
     assert checkpoint.load() == bytes([3])
     tasks.publish(context, job, [])
@@ -160,7 +161,7 @@ def test_what_travels_between_tasks_can_be_pickled(context: Context) -> None:
 
 
 def test_an_unwatched_run_is_told_everything_and_says_nothing(store: Store, capsys: pytest.CaptureFixture[str]) -> None:
-    whole(Context(store, Unwatched(), {}, Claims(Lease(store.root, None))), step(RAMP, 0))
+    whole(Context(store, Unwatched(), {}, Claims(FolderLease(store.layout.root, None))), step(RAMP, 0))
     assert capsys.readouterr() == ("", "")
 
 

@@ -34,7 +34,8 @@ def test_an_input_that_is_there_is_followed_to_its_cause(toy_run: ToyRun, toy_pl
 
 
 def test_an_input_that_is_gone_is_named(toy_run: ToyRun, toy_plan: ToyPlan, store: Store) -> None:
-    from semidense.cache.upkeep.gc import Limits, collect, survey
+    from semidense.cache.upkeep.gc import collect, survey
+    from semidense.cache.upkeep.limits import Limits
 
     toy_run(chain())
     items = [

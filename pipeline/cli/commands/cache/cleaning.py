@@ -9,7 +9,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from semidense.cache import Entry
-from semidense.cache.upkeep.gc import Item, Limits, Survey, collect, survey
+from semidense.cache.upkeep.gc import collect, survey
+from semidense.cache.upkeep.limits import Item, Limits, Survey
 from semidense.pipeline.api import Task, open_store, status
 from semidense.pipeline.cli.console import print_json
 from semidense.pipeline.plan.environment import former_version

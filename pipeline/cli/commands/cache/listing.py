@@ -12,7 +12,6 @@ from rich.table import Table
 
 from semidense.cache import Entry, Store
 from semidense.cache.keys.recipe import short
-from semidense.cache.upkeep.gc import last_used
 from semidense.cache.upkeep.verify import size, verify
 from semidense.pipeline.api import open_store
 from semidense.pipeline.cli.console import print_json
@@ -77,11 +76,11 @@ def _only(entries: Iterable[Entry], start: str) -> Entry:
 def list_entries(folder: Path | None, selection: Selection, as_json: bool) -> None:
     """Print a line an entry, oldest first, with the settings that it belongs to."""
     store = open_store(folder)
-    entries, settings = selection.of(store), Settings(store.entries())
+    entries, settings, used = selection.of(store), Settings(store.entries()), store.last_used()
     if as_json:
         names = ("key", "digest", "created", "seconds", "size")
         rows = [
-            {**entry.label, **{name: getattr(entry, name) for name in names}, "last_used": _used(store, entry)}
+            {**entry.label, **{name: getattr(entry, name) for name in names}, "last_used": _time(used(entry.key))}
             | {"settings": settings.text(entry)}
             for entry in entries
         ]
@@ -92,7 +91,7 @@ def list_entries(folder: Path | None, selection: Selection, as_json: bool) -> No
         column.no_wrap = True
     for entry in entries:
         label = [escape(entry.label.get(name, "")) for name in ("product", "dataset", "scene")]
-        times = (_age(entry.created), _age(_used(store, entry)), f"{entry.seconds:.2f} s")
+        times = (_age(entry.created), _age(_time(used(entry.key))), f"{entry.seconds:.2f} s")
         table.add_row(*label, bytes_text(entry.size), *times, short(entry.key), escape(_cut(settings.text(entry))))
     console = results()
     print_table(table, console, ("settings", "last used", "dataset", "made in", "age"))
@@ -104,8 +103,8 @@ def _cut(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
 
 
-def _used(store: Store, entry: Entry) -> str:
-    return datetime.fromtimestamp(last_used(store.layout, entry.key), UTC).isoformat(timespec="seconds")
+def _time(seconds: float) -> str:
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="seconds")
 
 
 def verify_entries(folder: Path | None, selection: Selection, as_json: bool) -> bool:

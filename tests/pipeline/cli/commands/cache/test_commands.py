@@ -97,7 +97,8 @@ def test_the_chain_of_an_entry_is_told_and_drawn(invoke: Invoke, filled: Store, 
 
 
 def test_what_was_deleted_since_is_said(filled: Store) -> None:
-    from semidense.cache.upkeep.gc import Limits, collect, survey
+    from semidense.cache.upkeep.gc import collect, survey
+    from semidense.cache.upkeep.limits import Limits
 
     (key, *_) = (entry.key for entry in filled.entries() if entry.recipe.stage == "sum")
     ramps = [

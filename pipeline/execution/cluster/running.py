@@ -6,15 +6,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from semidense.cache import CacheUnavailable, Lease
+from semidense.cache import CacheUnavailable, Lease, Store
+from semidense.pipeline.execution.cluster.deployment import connected, require_able
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.plan.errors import StageFailed, StageRefused, UsageError
 from semidense.pipeline.plan.plan import Made
 
 SETTLE_SECONDS = 0.3
 """How long the write may take that a task is in when its run ends early and does not wait for it."""
-ANSWER = 10.0
-"""Seconds in which a scheduler must answer at first."""
 PATIENCE = 60.0
 """Seconds without any worker after which a run is given up; one that died is started again in a few."""
 _PAUSE, _LOOK = 0.02, 1.0
@@ -25,14 +24,18 @@ Tasks = tuple[Mapping[str, Any], Sequence[str]]
 """Dask's tasks by key, and the keys of those whose results are wanted."""
 
 
-def run_on_cluster(tasks: Callable[[], Tasks], lease: Lease, watch: Watch, address: str) -> dict[str, Made]:
+def run_on_cluster(
+    tasks: Callable[[], Tasks], code: Mapping[str, str], store: Store, lease: Lease, watch: Watch, address: str
+) -> dict[str, Made]:
     """Carry out tasks on a cluster and return the results by their step's id, in their order.
 
     Args:
         tasks: gives the tasks; wanted are the ``Made`` of each step.
+        code: hash by name of each module that this needs; the workers must have the same.
+        store: the cache, which the workers must see.
         lease: of the run; its drafts are gone at the end, however that comes.
-        watch: told of each product that was made.
-        address: of the scheduler.
+        watch: told about the workers, and of each product that was made.
+        address: of the scheduler, see ``deployment.FORMS``.
 
     Raises:
         UsageError: if the scheduler or all workers are lost, or one task after another kills its worker.
@@ -40,7 +43,8 @@ def run_on_cluster(tasks: Callable[[], Tasks], lease: Lease, watch: Watch, addre
     """
     import distributed  # noqa: F401 - which sets up its loggers
 
-    with _quietly(), _explained(address), _connected(address) as client:
+    with _quietly(), _explained(address), connected(address) as client:
+        watch.deployed(require_able(client, lease, code, str(store.root)))
         graph, keys = tasks()
         futures = client.get(graph, list(keys), sync=False)
         try:
@@ -87,38 +91,6 @@ def _explained(address: str) -> Iterator[None]:
             f"the Dask scheduler at {address} does not answer any more: start it and run again; what was made before "
             "is kept"
         ) from error
-
-
-@contextmanager
-def _connected(address: str) -> Iterator[Any]:
-    from distributed import Client
-
-    _require_form(address)
-    try:
-        client = Client(address, timeout=ANSWER, set_as_default=False)
-    except Exception as error:  # noqa: BLE001 - Dask raises many kinds, its own assertions among them
-        raise UsageError(f"no Dask scheduler answers at {address}: {_first_line(error)}") from None
-    try:
-        yield client
-    finally:
-        with suppress(Exception):
-            client.close(timeout=2)
-
-
-def _require_form(address: str) -> None:
-    """Refuse a malformed address here: Dask's client of one takes 20 s to go away."""
-    from distributed.comm.addressing import get_address_host_port
-
-    try:
-        get_address_host_port(address)
-    except ValueError as error:
-        raise UsageError(
-            f"no Dask scheduler answers at {address!r}: {_first_line(error)}; write its address as tcp://HOST:PORT"
-        ) from None
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).partition("\n")[0] or type(error).__name__
 
 
 def _arriving(client: Any, futures: Sequence[Any], watch: Watch) -> Iterator[Made]:  # noqa: ANN401

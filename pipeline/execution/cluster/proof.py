@@ -27,14 +27,23 @@ def require_same(step: Step, runner: Mapping[str, str]) -> None:
     Raises:
         UsageError: naming this machine and the first module or version that differs.
     """
-    for module, expected in {**step.code, **runner}.items():
-        if (found := module_hash(module)) != expected:
-            what = "has another text" if found else "is missing"
-            raise UsageError(_refusal(f"the module {module} {what} here than where the run was started"))
+    require_same_code({**step.code, **runner})
     own = environment(step.stage)
     for name, version in step.environment.items():
         if own.get(name) != version:
             raise UsageError(_refusal(f"{name} is {own.get(name)} here and {version} where the run was started"))
+
+
+def require_same_code(code: Mapping[str, str]) -> None:
+    """Refuse to work where one of these modules has another text than its hash says.
+
+    Raises:
+        UsageError: naming this machine and the module.
+    """
+    for module, expected in code.items():
+        if (found := module_hash(module)) != expected:
+            what = "has another text here than" if found else "is missing here, unlike"
+            raise UsageError(_refusal(f"the module {module} {what} where the run was started"))
 
 
 def _refusal(difference: str) -> str:

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from semidense.cache import code_parts
-from semidense.pipeline.execution.proof import require_same, runner_code
+from semidense.pipeline.execution.cluster.proof import require_same, runner_code
 from semidense.pipeline.plan.environment import cpu_kind, environment
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.steps import Step

@@ -1,0 +1,269 @@
+"""Work in progress in an object store: chunks are created where they stay, and nobody sees them without a record."""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from semidense.cache.entries.arrays import NAME, chunk_paths, new_array, require_dtype, require_fit, require_region
+from semidense.cache.entries.backend import Draft
+from semidense.cache.entries.entry import DATA, MANIFEST, Entry, File, Manifest
+from semidense.cache.errors import DamagedEntry, EntryNotFound, IncompleteDraft, InvalidArray, InvalidKey
+from semidense.cache.files import in_threads
+from semidense.cache.objects import records
+from semidense.cache.objects.living import Living
+from semidense.cache.objects.near import near
+from semidense.cache.objects.requests import Found, Objects, connect
+
+if TYPE_CHECKING:
+    import zarr
+    from numpy.typing import NDArray
+
+GIVEN_UP = b"given up\n"
+"""Stands in place of the manifest of a draft that will never be published."""
+_HASH = "sha256"
+_own: dict[str, Living] = {}
+"""Leases of drafts that belong to no run, by their place: held until the draft is published or deleted."""
+
+
+def hold(place: str, lease: Living) -> None:
+    """Hold a lease for one draft alone."""
+    _own[place] = lease
+
+
+@dataclass(frozen=True)
+class ObjectDraft(Draft):
+    """A draft below a prefix of its own; ``Draft`` says what its methods do.
+
+    Attributes:
+        url: of the cache.
+        place: of the data, now and when they are published.
+    """
+
+    url: str
+    place: str
+
+    @property
+    def _objects(self) -> Objects:
+        return connect(self.url)
+
+    @property
+    def _mark(self) -> str:
+        return f"drafts/{self.place}"
+
+    def _path(self, path: str) -> str:
+        return f"data/{self.place}/{path}"
+
+    def create_array(
+        self,
+        name: str,
+        shape: Sequence[int],
+        dtype: str,
+        chunks: Sequence[int],
+        dims: Sequence[str],
+        attrs: Mapping[str, Any],
+        fill_value: float | None = None,
+    ) -> None:
+        """Add an empty array, see ``Draft``."""
+        kind = require_dtype(name, dtype)
+        self._require_exists()
+        require_fit(self.recipe.stage, self._sizes(), name, shape, chunks, dims)
+        memory, place = _memory(name)
+        new_array(place, shape, kind, chunks, dims, attrs, fill_value)
+        self._put(f"{DATA}/zarr.json", _group())
+        self._put(f"{DATA}/{name}/zarr.json", memory[f"{name}/zarr.json"].to_bytes())
+
+    def write(self, name: str, region: tuple[slice, ...], data: "NDArray[Any]") -> None:
+        """Write one region of an array, see ``Draft``."""
+        self._require_exists()
+        memory, array = self._encoder(name)
+        array[require_region(f"array {name!r} of {self.recipe.stage}", array, region, data)] = data
+        chunks = [path for path in memory if path.startswith(f"{name}/c")]
+        in_threads(lambda path: self._put(f"{DATA}/{path}", memory[path].to_bytes()), chunks)
+
+    def has_array(self, name: str) -> bool:
+        """Return whether ``create_array`` made an array of this name."""
+        return bool(NAME.fullmatch(name)) and self._about(name) is not None
+
+    def holds(self, name: str, region: tuple[slice, ...] | None = None) -> bool:
+        """Return whether a region of an array was written, see ``Draft``."""
+        if not self.has_array(name):
+            return False
+        return all(self._objects.head(self._path(path)) for path in self._chunks(name, region))
+
+    def published(self) -> Entry | None:
+        """Return the entry that the draft became, see ``Draft``."""
+        try:
+            record = records.read(self._objects, self.recipe.key)
+        except (EntryNotFound, DamagedEntry):
+            return None
+        if record.place == self.place:
+            discard(self._objects, self.place)
+        return None if self.exists() else record.entry
+
+    def publish(self, seconds: float, extras: Mapping[str, Any]) -> Entry:
+        """Make the draft an entry that everybody sees, see ``Draft``."""
+        try:
+            self._require_exists()
+            manifest = self._manifest()
+            now = datetime.now(UTC).isoformat(timespec="microseconds")
+            key, label = self.recipe.key, self.label
+            entry = Entry(key, self.recipe, manifest.digest, label, now, float(seconds), manifest.size, extras)
+            self._decide(manifest.to_bytes())
+            return records.publish(self._objects, records.Record(entry, self.place)).entry
+        finally:
+            self.discard()
+
+    def _decide(self, manifest: bytes) -> None:
+        """Create the manifest, unless the draft was given up before."""
+        there = self._objects.create(self._path(MANIFEST), manifest)
+        if there:
+            raise IncompleteDraft(f"the draft of {self.recipe.stage} is gone: it was given up in {self.url}")
+
+    def discard(self) -> None:
+        """Delete the draft, see ``Draft``."""
+        discard(self._objects, self.place)
+        if own := _own.pop(self.place, None):
+            own.release()
+
+    def exists(self) -> bool:
+        """Return whether the draft was neither published nor deleted."""
+        return self._objects.head(self._mark) is not None
+
+    def begin(self) -> None:
+        """Note that the draft exists."""
+        self._objects.create(self._mark, self.recipe.key.encode("ascii"))
+
+    def _require_exists(self) -> None:
+        if not self.exists():
+            raise InvalidArray(
+                f"the draft of {self.recipe.stage} is gone: {self.place} in {self.url} was published or deleted"
+            )
+
+    def _put(self, path: str, data: bytes) -> None:
+        """Create a file of the draft with its hash beside it; what another writer created first stays."""
+        sha256 = hashlib.sha256(data).hexdigest()
+        if self._objects.create(self._path(path), data, {_HASH: sha256}) is None:
+            near().keep(sha256, data)
+
+    def _about(self, name: str) -> dict[str, Any] | None:
+        """Return what zarr wrote of an array; None if it was not created."""
+        return _metadata(self.url, self._path(f"{DATA}/{name}/zarr.json"))
+
+    def _arrays(self) -> dict[str, dict[str, Any]]:
+        found = {name: self._about(name) for name in self._objects.names(self._path(DATA)) if name != "zarr.json"}
+        return {name: about for name, about in found.items() if about is not None}
+
+    def _sizes(self) -> dict[str, dict[str, int]]:
+        """Return the length of each dimension of each array that is there."""
+        return {
+            name: dict(zip(each.get("dimension_names", ()), each["shape"], strict=True))
+            for name, each in self._arrays().items()
+        }
+
+    def _chunks(self, name: str, region: tuple[slice, ...] | None = None) -> list[str]:
+        about = self._about(name) or {}
+        chunks = chunk_paths(about["shape"], about["chunk_grid"]["configuration"]["chunk_shape"], region)
+        return [f"{DATA}/{name}/{path}" for path in chunks]
+
+    def _encoder(self, name: str) -> tuple[dict[str, Any], "zarr.Array[Any]"]:
+        """Return an array whose chunks are encoded as everywhere, and the mapping that they are put into."""
+        import zarr
+        from zarr.core.buffer import default_buffer_prototype
+
+        about = self._about(name) if NAME.fullmatch(name) else None
+        if about is None:
+            raise InvalidArray(f"{self.recipe.stage} has no array {name!r}: create it before writing")
+        memory, place = _memory(name)
+        memory[f"{name}/zarr.json"] = default_buffer_prototype().buffer.from_bytes(json.dumps(about).encode("ascii"))
+        array = zarr.open_array(place, mode="r+", zarr_format=3)
+        return memory, array.with_config({"write_empty_chunks": True})
+
+    def _manifest(self) -> Manifest:
+        """Return the manifest of every file of the draft, once each is known to be there."""
+        arrays = self._arrays()
+        if not arrays:
+            raise IncompleteDraft(f"the draft of {self.recipe.stage} has no array: create and write one")
+        paths = [f"{DATA}/zarr.json"]
+        for name in arrays:
+            paths += [f"{DATA}/{name}/zarr.json", *self._chunks(name)]
+        found = dict(zip(paths, in_threads(lambda path: self._objects.head(self._path(path)), paths), strict=True))
+        return Manifest(tuple(File(path, each.size, each.attributes[_HASH]) for path, each in self._whole(found)))
+
+    def _whole(self, found: Mapping[str, Found | None]) -> Iterable[tuple[str, Found]]:
+        """Return the files in order; refuse to publish a draft that lacks some."""
+        missing = [path for path, each in found.items() if each is None]
+        if missing:
+            raise IncompleteDraft(
+                f"the draft of {self.recipe.stage} lacks {len(missing)} of {len(found)} files, first {missing[0]}: "
+                "write every region before publishing"
+            )
+        return [(path, each) for path, each in sorted(found.items()) if each]
+
+
+def discard(objects: Objects, place: str) -> None:
+    """Give a draft up and delete its data; of one that was published, forget only that it was a draft.
+
+    Raises:
+        CacheUnavailable: if the store refuses.
+    """
+    mark = objects.get(f"drafts/{place}")
+    if mark is None:
+        return
+    data = [each.path for each in objects.below(f"data/{place}") if not each.path.endswith(f"/{MANIFEST}")]
+    if objects.create(f"data/{place}/{MANIFEST}", GIVEN_UP) is None:
+        objects.delete(data)  # the mark in place of the manifest stays until a cleaning: a writer may be late
+    elif _lost(objects, mark.data.decode("ascii", "replace"), place):
+        objects.delete([*data, f"data/{place}/{MANIFEST}"])
+    objects.delete([f"drafts/{place}"])
+
+
+def _lost(objects: Objects, key: str, place: str) -> bool:
+    """Return whether a sealed draft will never be an entry: another one is. If none is, its writer may be about to."""
+    try:
+        return records.read(objects, key).place != place
+    except (EntryNotFound, DamagedEntry, InvalidKey):
+        return False
+
+
+@lru_cache(1024)
+def _known(url: str, path: str) -> str:
+    """Return the text of an object that never changes.
+
+    Raises:
+        KeyError: if it is not there: that is not remembered.
+    """
+    if (found := connect(url).get(path)) is None:
+        raise KeyError(path)
+    return found.data.decode("utf-8")
+
+
+def _metadata(url: str, path: str) -> dict[str, Any] | None:
+    try:
+        about: dict[str, Any] = json.loads(_known(url, path))
+    except KeyError:
+        return None
+    return about
+
+
+def _memory(name: str) -> tuple[dict[str, Any], Any]:
+    """Return a mapping of zarr's buffers, and the place of an array in the store that writes into it."""
+    from zarr.storage import MemoryStore, StorePath
+
+    memory: dict[str, Any] = {}
+    return memory, StorePath(MemoryStore(memory), name)
+
+
+@lru_cache(1)
+def _group() -> bytes:
+    """Return the metadata of the group that an entry's arrays are in."""
+    import zarr
+    from zarr.storage import MemoryStore
+
+    memory: dict[str, Any] = {}
+    zarr.create_group(MemoryStore(memory), zarr_format=3)
+    data: bytes = memory["zarr.json"].to_bytes()
+    return data

@@ -1,0 +1,191 @@
+"""A real S3 server on loopback, and a proxy before it that lets requests go wrong."""
+
+import os
+import random
+import socket
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from http.client import HTTPConnection, HTTPException
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from uuid import uuid4
+
+SERVER = """
+import sys, threading
+from werkzeug.serving import run_simple
+from moto.moto_server.werkzeug_app import DomainDispatcherApplication, MotoRequestHandler, create_backend_app
+
+class OneWriteAtATime:
+    '''moto compares a condition and then writes, in two steps; S3 does both in one.'''
+    def __init__(self, app):
+        self.app, self.lock = app, threading.Lock()
+    def __call__(self, environ, start_response):
+        if environ["REQUEST_METHOD"] != "PUT":
+            return self.app(environ, start_response)
+        with self.lock:
+            return list(self.app(environ, start_response))
+
+class Handler(MotoRequestHandler):
+    protocol_version = "HTTP/1.1"
+
+app = OneWriteAtATime(DomainDispatcherApplication(create_backend_app))
+run_simple("127.0.0.1", int(sys.argv[1]), app, threaded=True, request_handler=Handler)
+"""
+KEYS = {"AWS_ACCESS_KEY_ID": "test", "AWS_SECRET_ACCESS_KEY": "test", "AWS_REGION": "us-east-1"}
+BUCKET = "bucket"
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@contextmanager
+def s3_server() -> Iterator[int]:
+    """Start moto's server with a bucket; yield its port."""
+    port = free_port()
+    command = [sys.executable, "-c", SERVER, str(port)]
+    server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        _make_bucket(server, port)
+        yield port
+    finally:
+        server.kill()
+        server.wait()
+
+
+def _make_bucket(server: "subprocess.Popen[bytes]", port: int) -> None:
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and server.poll() is None:
+        with suppress(OSError):
+            urllib.request.urlopen(urllib.request.Request(f"http://127.0.0.1:{port}/{BUCKET}", method="PUT")).close()
+            return
+        time.sleep(0.1)
+    raise RuntimeError("the S3 server does not start")
+
+
+@contextmanager
+def pointed_at(port: int) -> Iterator[str]:
+    """Have this process and its children use the server at a port; yield the URL of a fresh cache."""
+    before = dict(os.environ)
+    os.environ.update({**KEYS, "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}"})
+    try:
+        yield f"s3://{BUCKET}/{uuid4().hex}"
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
+@dataclass
+class Faults:
+    """What a proxy does to requests, and what it saw.
+
+    Attributes:
+        rate: part of the requests that go wrong.
+        kinds: what happens to these.
+        slow: seconds that a slow answer takes.
+        injected: how often each kind happened.
+        requests: how many requests of each method came.
+        up: bytes of their bodies.
+        down: bytes of the answers' bodies.
+    """
+
+    rate: float = 0.0
+    kinds: tuple[str, ...] = ("500", "503", "dropped before", "lost answer", "slow")
+    slow: float = 1.0
+    seed: int = 26
+    injected: Counter[str] = field(default_factory=Counter)
+    requests: Counter[str] = field(default_factory=Counter)
+    up: int = 0
+    down: int = 0
+
+    def __post_init__(self) -> None:
+        self._chance, self._lock = random.Random(self.seed), threading.Lock()
+
+    def draw(self, method: str, size: int) -> str:
+        """Return what happens to a request; nothing for most."""
+        with self._lock:
+            self.requests[method] += 1
+            self.up += size
+            if self._chance.random() >= self.rate:
+                return ""
+            kind = self._chance.choice(self.kinds)
+            self.injected[kind] += 1
+            return kind
+
+
+@contextmanager
+def proxy(port: int, faults: Faults) -> Iterator[int]:
+    """Start a proxy before a server; yield its port."""
+
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def handle_one_request(self) -> None:
+            with suppress(ConnectionError, HTTPException):
+                super().handle_one_request()
+
+        def log_message(self, *_: object) -> None:
+            return
+
+        def __getattr__(self, name: str) -> Callable[[], None]:
+            if name.startswith("do_"):
+                return self._pass_on
+            raise AttributeError(name)
+
+        def _pass_on(self) -> None:
+            body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
+            kind = faults.draw(self.command, len(body))
+            if kind in ("500", "503"):
+                return self._answer(int(kind), {}, b"injected")
+            if kind == "dropped before":
+                return self._drop()
+            if kind == "slow":
+                time.sleep(faults.slow)
+            status, headers, data = self._ask(body)
+            if kind == "lost answer":
+                return self._drop()
+            faults.down += len(data)
+            return self._answer(status, headers, data)
+
+        def _ask(self, body: bytes) -> tuple[int, dict[str, str], bytes]:
+            connection = HTTPConnection("127.0.0.1", port, timeout=60)
+            connection.request(self.command, self.path, body, dict(self.headers))
+            answer = connection.getresponse()
+            data = answer.read()
+            connection.close()
+            return answer.status, dict(answer.getheaders()), data
+
+        def _answer(self, status: int, headers: dict[str, str], data: bytes) -> None:
+            self.send_response_only(status)
+            own = {"transfer-encoding", "connection"} | ({"content-length"} if self.command != "HEAD" else set())
+            for name, value in headers.items():
+                if name.lower() not in own:
+                    self.send_header(name, value)
+            if self.command != "HEAD":
+                self.send_header("Content-Length", str(len(data)))
+            self.end_headers()
+            self.wfile.write(data)
+
+        def _drop(self) -> None:
+            self.close_connection = True
+            with suppress(OSError):
+                self.connection.shutdown(socket.SHUT_RDWR)
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    server.daemon_threads = True
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    try:
+        yield server.server_port
+    finally:
+        server.shutdown()
+        server.server_close()
