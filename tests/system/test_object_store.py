@@ -1,4 +1,4 @@
-"""Runs over a real S3 server on loopback: the same digests as on disk, by threads and by processes, also with faults."""
+"""Runs over a real S3 server on loopback: the digests are those on disk, by threads and processes, also with faults."""
 
 from collections.abc import Iterator
 from dataclasses import replace

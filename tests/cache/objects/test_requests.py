@@ -1,0 +1,63 @@
+"""Requests that go wrong, and stores that cannot be used."""
+
+from typing import Any
+
+import pytest
+
+from semidense.cache import CacheUnavailable, Store
+from semidense.cache.objects import requests
+from semidense.cache.objects.requests import Objects, connect
+from tests.s3 import Faults, free_port, pointed_at, proxy
+
+
+@pytest.mark.parametrize("kind", Faults().kinds)
+def test_a_request_is_sent_again_until_it_is_answered(s3_port: int, kind: str) -> None:
+    faults = Faults(rate=0.5, kinds=(kind,), slow=0.1)
+    with proxy(s3_port, faults) as port, pointed_at(port) as url:
+        objects = connect(url)
+        for number in range(4):
+            assert objects.create(f"a/{number}", b"one") is None
+        other = objects.create("a/0", b"two")
+        assert other is not None
+        assert other.data == b"one"
+        assert objects.replace("a/0", b"three", other)
+        assert not objects.replace("a/0", b"four", other)
+        assert [each.path for each in objects.below("a")] == [f"a/{number}" for number in range(4)]
+        objects.delete(["a/0", "a/none"])
+        assert objects.get("a/0") is None
+    assert faults.injected[kind] > 0
+
+
+def test_a_store_that_never_answers_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(requests, "PATIENCE", 0.5)
+    with (
+        pointed_at(free_port()) as url,
+        pytest.raises(CacheUnavailable, match=r"cannot read the cache at .*AWS_ENDPOINT_URL") as told,
+    ):
+        Store(url).find("0" * 64)
+    assert "\n" not in str(told.value)
+
+
+def test_a_bucket_that_is_not_there_is_told_in_one_line(s3_port: int) -> None:
+    with (
+        pointed_at(s3_port) as url,
+        pytest.raises(CacheUnavailable, match=r"cannot write to .*that the bucket exists") as told,
+    ):
+        Store(url.replace("bucket", "no-such-bucket")).claim("0" * 64)
+    assert "\n" not in str(told.value)
+
+
+class Careless(Objects):
+    """A store that writes whatever the condition says."""
+
+    def _put(self, path: str, data: bytes, mode: Any, attributes: Any) -> None:  # noqa: ANN401
+        super()._put(path, data, "overwrite", attributes)
+
+
+def test_a_store_without_conditional_writes_is_refused() -> None:
+    from obstore.store import MemoryStore
+
+    careless = Careless("memory://careless", MemoryStore())
+    with pytest.raises(CacheUnavailable, match="ignores conditional writes"):
+        careless.require_conditions()
+    assert list(careless.below("")) == []
