@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-_URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):/+(.*)", re.ASCII)
+_URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):(?:/+(.*))?", re.ASCII)  # of a URL alone, a path keeps no slash
 SCHEMES = ("s3", "gs", "az", "memory")
 """Object stores that a cache can be in."""
 

@@ -295,7 +295,7 @@ def test_a_url_of_another_kind_is_refused_in_one_line(url: str) -> None:
     for root in (url, Path(url)):
         with pytest.raises(
             CacheUnavailable,
-            match=r"^[a-z0-9]+:/[^\n]* is no place for a cache: name a folder, or an object store as s3://[^\n]+$",
+            match=r"^[a-z0-9]+:[^\n]* is no place for a cache: name a folder, or an object store as s3://[^\n]+$",
         ):
             Store(root)
 

@@ -68,7 +68,9 @@ def _start(workers: int, stack: ExitStack) -> str:
         raise UsageError("--scheduler processes:0: name at least one worker, such as processes:4")
     from distributed import LocalCluster
 
-    cluster = LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, silence_logs=60)
+    cluster = LocalCluster(
+        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=60
+    )
     stack.callback(cluster.close, timeout=5)
     return str(cluster.scheduler_address)
 
@@ -115,7 +117,13 @@ class Looked:
     refusal: str | None
 
 
-def look(lease: Lease, code: Mapping[str, str], versions: Mapping[str, str], cache: str) -> Looked:
+def look(
+    lease: Lease,
+    code: Mapping[str, str],
+    versions: Mapping[str, str],
+    cache: str,
+    dask_worker: Any = None,  # noqa: ANN401
+) -> Looked:
     """Return what the worker that this runs in says of itself.
 
     Args:
@@ -123,12 +131,10 @@ def look(lease: Lease, code: Mapping[str, str], versions: Mapping[str, str], cac
         code: hash by name of each module that the run needs.
         versions: of the packages that must be the same.
         cache: where it is, for people.
+        dask_worker: given by Dask, to an argument of this name.
     """
-    from distributed import get_worker
-
-    worker = get_worker()
     refusal = _refusal(lease, code, versions, cache)
-    return Looked(socket.gethostname(), worker.state.nthreads, worker.memory_manager.memory_limit, refusal)
+    return Looked(socket.gethostname(), dask_worker.state.nthreads, dask_worker.memory_manager.memory_limit, refusal)
 
 
 def _refusal(lease: Lease, code: Mapping[str, str], versions: Mapping[str, str], cache: str) -> str | None:

@@ -235,3 +235,19 @@ def test_a_prefix_of_somebody_else_is_refused(memory: Store, make: Make) -> None
     with pytest.raises(CacheUnavailable, match=r"is not a cache: it holds 'holiday.jpg' but no CACHE.TAG"):
         make(memory)
     assert [each.path for each in objects_of(memory).below("")] == ["holiday.jpg"]
+
+
+def test_a_publisher_killed_before_its_record_leaves_nothing_that_is_seen(
+    memory: Store, recipe: Recipe, filled: Callable[..., None], make: Make
+) -> None:
+    with memory.lease() as lease:
+        draft = memory.begin(recipe, {}, lease, "step")
+        filled(draft)
+        draft._decide(draft._manifest().to_bytes())  # type: ignore[attr-defined]
+        assert memory.find(recipe.key) is None
+        assert draft.published() is None
+        entry = memory.begin(recipe, {}, lease, "step").publish(1.5, {})
+        assert entry.digest == DIGEST, "another worker of the run ends what it began"
+    other = make(memory, n=4)
+    assert verify(memory).sound == tuple(sorted((entry.key, other.key)))
+    assert (size(memory).drafts, size(memory).orphans) == (0, 0)
