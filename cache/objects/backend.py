@@ -36,10 +36,10 @@ class ObjectBackend:
 
     def create(self) -> None:
         """Mark the prefix as a cache, see ``Backend``; refuse a store without conditional writes."""
-        self.objects.require_conditions()
-        if self.objects.get(names.TAG) is None:
+        if not self.objects.is_cache:
+            self.objects.require_conditions()
             self.require_cache()
-            self.objects.create(names.TAG, _TAG)
+            self.objects.is_cache = self.objects.create(names.TAG, _TAG) is None
 
     def require_cache(self) -> None:
         """Refuse a prefix with somebody else's objects, see ``Backend``."""

@@ -82,11 +82,16 @@ def _new(url: str) -> "Objects":
 
 
 class Objects:
-    """The objects below a URL."""
+    """The objects below a URL.
+
+    Attributes:
+        is_cache: whether this process has seen that they are a cache: it is asked for once.
+    """
 
     def __init__(self, url: str, store: Any) -> None:  # noqa: ANN401
         self.url = url
         self._store = store
+        self.is_cache = False
         self._skew: float | None = None
 
     def get(self, path: str) -> Found | None:

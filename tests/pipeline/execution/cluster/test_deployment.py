@@ -150,7 +150,7 @@ def test_keys_travel_and_arrays_do_not(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(slow, "SECONDS", 0.0)
     sent: dict[str, int] = {}
     with (
-        LocalCluster(n_workers=0, processes=False, dashboard_address=None) as cluster,
+        LocalCluster(n_workers=0, processes=False, protocol="tcp", dashboard_address=None) as cluster,
         counted(cluster.scheduler_address) as (address, bytes_so_far),
         _worker(cluster, address, Worker),
     ):
