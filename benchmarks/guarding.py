@@ -31,15 +31,15 @@ TARGET = 3.0
 LONG = 1.0
 """Seconds from which on a stage is held to the target; shorter ones count in the whole."""
 GUARDS = (
-    "semidense.cache.store.inspect",
-    "semidense.cache.store.inspect_data",
+    "semidense.cache.entries.folder.inspect",
+    "semidense.cache.entries.folder.inspect_data",
     "semidense.cache.entries.publish.inspect",
     "semidense.cache.entries.publish.remove_strays",
     "semidense.cache.entries.publish.seal",
     "semidense.cache.entries.publish.commit",
     "semidense.cache.entries.draft.FolderDraft._complete",
     "semidense.cache.store.Store.claim",
-    "semidense.cache.processes.lease.Lease.add",
+    "semidense.cache.processes.lease.FolderLease.add",
 )
 TASKS = ("begin", "create_arrays", "make_tile", "make_whole", "publish")
 

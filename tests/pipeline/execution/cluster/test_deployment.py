@@ -109,7 +109,7 @@ def test_a_scheduler_file_and_the_environment_name_a_scheduler(
 def test_what_names_no_scheduler_is_refused_in_one_line(
     scheduler: str, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(deployment, "PATIENCE", "2s")
+    monkeypatch.setattr(deployment, "ANSWER", 2.0)
     with pytest.raises(UsageError, match=message) as refused, connected(scheduler):
         pass
     assert "\n" not in str(refused.value)
