@@ -48,6 +48,8 @@ class Listed:
 
 _connected: dict[str, "Objects"] = {}
 _connecting = threading.Lock()
+_process: int | None = None
+"""The process that made the first connection: the threads of connections are its own."""
 
 
 def connect(url: str) -> "Objects":
@@ -56,7 +58,9 @@ def connect(url: str) -> "Objects":
     Raises:
         CacheUnavailable: if the URL names no object store, or the package for it is missing.
     """
+    global _process
     with _connecting:
+        _process = _process or os.getpid()
         if url not in _connected:
             _connected[url] = _new(url)
         return _connected[url]
@@ -193,6 +197,14 @@ class Objects:
         old = self.get(path)
         return bool(old and self.replace(path, data, old) and not self.replace(path, uuid4().bytes, old))
 
+    def _require_own_process(self) -> None:
+        """Refuse a request from a forked child, which would wait for threads that only its parent has."""
+        if _process != os.getpid():
+            raise CacheUnavailable(
+                f"a forked process cannot use the cache at {self.url}: start it by spawn "
+                "(multiprocessing.get_context('spawn')), or read the results before the fork"
+            )
+
     def _put(self, path: str, data: bytes, mode: Any, attributes: Mapping[str, str] | None) -> None:  # noqa: ANN401
         import obstore
 
@@ -214,6 +226,7 @@ class Objects:
         """Return what a request gives, after sending it again while the store does not answer, or answers badly."""
         from obstore.exceptions import BaseError
 
+        self._require_own_process()
         deadline, pause = time.monotonic() + PATIENCE, FIRST_PAUSE
         while True:
             try:

@@ -1,5 +1,6 @@
 """Requests that go wrong, and stores that cannot be used."""
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -61,3 +62,21 @@ def test_a_store_without_conditional_writes_is_refused() -> None:
     with pytest.raises(CacheUnavailable, match="ignores conditional writes"):
         careless.require_conditions()
     assert list(careless.below("")) == []
+
+
+def test_a_forked_child_is_refused_and_does_not_hang(run_script: Callable[..., str]) -> None:
+    told = run_script(
+        """
+store = Store("memory://forked")
+entry = make("memory://forked")
+def look():
+    from semidense.cache import CacheUnavailable
+    try:
+        store.read(entry.key)
+    except CacheUnavailable as error:
+        print(error, flush=True)
+assert code(in_child(look)) == 0
+"""
+    )
+    assert told.startswith("a forked process cannot use the cache at memory://forked: start it by spawn")
+    assert "\n" not in told.rstrip()
