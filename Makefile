@@ -9,7 +9,7 @@ ifeq ($(filter exact guided,$(MODE)),)
 $(error MODE=$(MODE): the weights that come with the package are of exact and of guided volumes)
 endif
 
-.PHONY: demo test lint docs train descriptors evaluation evidence calibration train-general bench faults silence wheel clean
+.PHONY: demo test lint docs train descriptors evaluation evidence foreign calibration train-general bench faults silence wheel clean
 
 demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
 	$(BIN)/pipeline run motorcycle --output demo
@@ -62,6 +62,12 @@ train-general: $(READY)  ## DATA=DIR: train the preset robust on DIR/middlebury 
 	done
 	cp build/general/calibration/calibration.safetensors \
 		stages/weights/calibration.general.evidence_confidence.aggregated.fast.safetensors
+
+foreign: $(READY)  ## DATA=DIR: train what scores maps of other matchers, and put its weights in place
+	@test -n "$(DATA)" || { echo "make foreign: say where the Middlebury sets are: make foreign DATA=DIR"; exit 2; }
+	$(BIN)/pipeline run middlebury:$(DATA) --train --upto foreign_net --set costvolume.mode=fast --output build/foreign \
+		--set 'training.shipped=["matching_net", "descriptor_net", "evaluation_net"]'
+	cp build/foreign/foreign_net.safetensors stages/weights/
 
 calibration: $(READY)  ## DATA=DIR MODE=guided: measure on the same scenes what its confidence is worth, put the table in place
 	@test -n "$(DATA)" || { echo "make calibration: say where the Middlebury sets are: make calibration DATA=DIR"; exit 2; }

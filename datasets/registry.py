@@ -114,6 +114,7 @@ _KINDS = (
         "your own: two files, folders or patterns, or pair:LIST.csv; see `match`",
         f"{_HERE}.pairs.pair",
     ),
+    Kind("map:PATTERN[,KEY=VALUE,...]@DATASET", "a dataset with the maps of another matcher", f"{_HERE}.pairs.maps"),
     Kind("toml:FILE", "a data set of your own that a small TOML file describes", f"{_HERE}.pairs.described"),
 )
 GROUP = "semidense.datasets"

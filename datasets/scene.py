@@ -28,6 +28,8 @@ IMAGE_ROLES: tuple[str, ...] = ("left", "right")
 TRUTH_ROLES: tuple[str, ...] = ("truth", "truth_right", "truth_nonocc", "mask")
 """Roles of the files that the ground truth is read from."""
 
+_MAPS = "semidense.datasets.pairs.map_files"
+
 
 @dataclass(frozen=True)
 class DisparityRange:
@@ -187,12 +189,13 @@ class SceneSource:
         reader: Dotted name of the module that reads it (a `SceneReader`).
         files: Role to path. `IMAGE_ROLES` and `TRUTH_ROLES` name those that images and truth are read from.
         parameters: Whatever else the reader needs.
-        has_truth: Whether a ground truth is there.
+        has_truth: Whether there is a ground truth.
         calibration: What depth needs, or None.
-        open_ends: The ends of ``disparities`` that nobody knows: those hold the widest that the image allows, until
-            somebody estimates them.
+        open_ends: The ends of ``disparities`` that are still to be estimated: they are as wide as the image allows.
         warnings: What looks wrong with the files, a line each.
         digests: Role to the sha256 of the bytes that its file must have, in hex; a role without one is not checked.
+        map_reading: What the numbers of the file ``disparity`` mean: the fields of `pairs.map_files.Reading`.
+        one_view: Whether there is no right view; the images then have zeros in its place.
     """
 
     name: str
@@ -208,6 +211,8 @@ class SceneSource:
     open_ends: tuple[RangeEnd, ...] = ()
     warnings: tuple[str, ...] = field(default=(), hash=False)
     digests: Mapping[str, str] = field(default_factory=dict, hash=False)
+    map_reading: Mapping[str, float | None] = field(default_factory=dict, hash=False)
+    one_view: bool = False
 
     def load(self) -> Scene:
         """Read images and truth.
@@ -234,6 +239,14 @@ class SceneSource:
         if costs.shape[2] != self.disparities.count:
             raise DatasetError(f"{self.name}: {costs.shape[2]} disparities, but {self.disparities.count} were listed")
         return costs
+
+    def load_map(self) -> DisparityMap:
+        """Read the disparity map that came with the scene, (y, x) px, NaN none; raises what `load` raises."""
+        maps = import_module(_MAPS)
+        with exact_files(self.files, self.digests) as files:
+            found: DisparityMap = maps.read_map(files["disparity"], maps.Reading(**self.map_reading))
+        self._check_size("disparity map", found)
+        return found
 
     def load_truth(self) -> Truth | None:
         """Read the ground truth only, None where there is none; raises what `load` raises."""
@@ -268,9 +281,9 @@ class SceneSource:
         """Name the content that the truth is read from; see `identity`."""
         return self.identity(TRUTH_ROLES)
 
-    def costs_identity(self) -> dict[str, Any]:
-        """Name the content that the cost volume is read from; see `identity`."""
-        return self.identity(("costs",))
+    def has(self, role: str) -> bool:
+        """Tell whether something of a role, such as ``costs`` or ``disparity``, came with the scene."""
+        return role in self.files
 
     def _reader(self) -> SceneReader:
         return cast(SceneReader, import_module(self.reader))

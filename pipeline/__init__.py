@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from semidense.pipeline.pages.viewer import view
     from semidense.pipeline.pairs.match import Match, match
     from semidense.pipeline.pairs.opencv import StereoMatcher
+    from semidense.pipeline.pairs.score import Score, score
     from semidense.pipeline.plan.config import Config
     from semidense.pipeline.results.opening import open_product, recorded
     from semidense.pipeline.results.result import Result
@@ -29,6 +30,7 @@ _HOMES = {
     "Config": "plan.config",
     "Match": "pairs.match",
     "Result": "results.result",
+    "Score": "pairs.score",
     "StereoMatcher": "pairs.opencv",
     "Task": "api",
     "compare": "comparison.experiments",
@@ -42,6 +44,7 @@ _HOMES = {
     "register_dataset": "..datasets.registry",
     "report": "pages.report",
     "run": "api",
+    "score": "pairs.score",
     "status": "api",
     "sweep": "api",
     "view": "pages.viewer",
@@ -51,6 +54,7 @@ __all__ = [
     "Config",
     "Match",
     "Result",
+    "Score",
     "StereoMatcher",
     "Task",
     "compare",
@@ -64,6 +68,7 @@ __all__ = [
     "register_dataset",
     "report",
     "run",
+    "score",
     "status",
     "sweep",
     "view",

@@ -8,7 +8,7 @@ names a ``Stage`` or several, or by ``register``.
 from collections.abc import Iterable
 from importlib.metadata import EntryPoint, entry_points
 
-from semidense.stages.baselines.declaration import BASELINES
+from semidense.stages.baselines.declaration import BASELINES, MATCHED
 from semidense.stages.disparity.declaration import (
     AGGREGATED,
     DISPARITY,
@@ -21,6 +21,7 @@ from semidense.stages.disparity.survey import SURVEY
 from semidense.stages.evaluation.calibration.declaration import CALIBRATED_CONFIDENCE, CALIBRATION
 from semidense.stages.evaluation.declaration import CONFIDENCE, EVALUATION_NET, EVALUATION_SAMPLES
 from semidense.stages.evaluation.evidence.declaration import EVIDENCE_CONFIDENCE, EVIDENCE_NET, EVIDENCE_SAMPLES
+from semidense.stages.evaluation.evidence.foreign.declaration import FOREIGN_CONFIDENCE, FOREIGN_NET, FOREIGN_SAMPLES
 from semidense.stages.evaluation.filtering import SEMIDENSE
 from semidense.stages.evaluation.silence.declaration import COST_MARGIN, DISTINCTIVENESS
 from semidense.stages.matching.declaration import COST_VOLUME, DESCRIPTOR_NET, MATCHING_NET, MATCHING_SAMPLES
@@ -46,8 +47,11 @@ CATALOG: tuple[Stage, ...] = (
     EVALUATION_NET,
     EVIDENCE_SAMPLES,
     EVIDENCE_NET,
+    FOREIGN_SAMPLES,
+    FOREIGN_NET,
     CONFIDENCE,
     EVIDENCE_CONFIDENCE,
+    FOREIGN_CONFIDENCE,
     CALIBRATION,
     CALIBRATED_CONFIDENCE,
     SEMIDENSE,
@@ -58,8 +62,8 @@ CATALOG: tuple[Stage, ...] = (
 )
 """The stages, in the order of the dataflow."""
 
-STAGES = {stage.product: stage for stage in (*CATALOG, *BASELINES)}
-"""The stages by the name of their product: those of the dataflow, what they are compared with, those of others."""
+STAGES = {stage.product: stage for stage in (*MATCHED, *CATALOG, *BASELINES)}
+"""The stages by the name of their product: other matchers, the dataflow, other measures, and stages of others."""
 READ = ("images", "truth")
 """Products that are read from a scene, not computed: inputs of a stage like all others."""
 GROUP = "semidense.stages"

@@ -166,6 +166,7 @@ class Stage:
         learnt: its result is learnt from training scenes, and may come as a file of weights instead.
         cross_fitted: of a split stage: each training scene comes as networks of other scenes score it. Its settings
             have ``folds`` and ``fold_of_scene``.
+        one_view: of the images it looks at the left view alone, so that it works on a scene without a right one.
     """
 
     product: str
@@ -184,6 +185,7 @@ class Stage:
     needs: tuple[str, ...] = ()
     learnt: bool = False
     cross_fitted: bool = False
+    one_view: bool = False
 
     @property
     def module(self) -> str:

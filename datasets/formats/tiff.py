@@ -1,4 +1,4 @@
-"""Write maps as float TIFF: 32-bit floats without compression, NaN for none, what they are in the description."""
+"""Write maps as float TIFF: 32-bit floats without compression, NaN for none; and read those of other programs."""
 
 import json
 import os
@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from semidense.datasets.errors import ImageError
+from semidense.datasets.errors import ImageError, MissingFileError
 from semidense.datasets.formats.atomic import atomic_write
+from semidense.datasets.formats.files import open_file
 from semidense.datasets.formats.limits import check_pixels
 
 
@@ -37,3 +38,30 @@ def write_tiff(
     check_pixels(path, values.shape[0], values.shape[1], ImageError)
     with atomic_write(path) as file:
         Image.fromarray(values.astype(np.float32)).save(file, "TIFF", description=json.dumps(about or {}))
+
+
+def read_tiff(path: str | os.PathLike[str]) -> np.ndarray[tuple[int, ...], np.dtype[Any]]:
+    """Read a TIFF of one band of numbers.
+
+    Returns:
+        (y, x): float32, int32, uint16 or uint8, as stored.
+
+    Raises:
+        MissingFileError: If there is no such file.
+        ImageError: If it is no such TIFF, or above `MAX_PIXELS`.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    path = Path(path)
+    try:
+        with open_file(path) as file, Image.open(file, formats=["TIFF"]) as image:
+            check_pixels(path, image.height, image.width, ImageError)
+            if len(image.getbands()) != 1 or getattr(image, "n_frames", 1) != 1:
+                raise ImageError(f"{path}: {len(image.getbands())} bands; a map is one band of one image")
+            return np.array(image)
+    except UnidentifiedImageError as error:
+        raise ImageError(f"{path}: no TIFF that can be read; save 32-bit floats without compression") from error
+    except (OSError, ValueError, SyntaxError) as error:
+        raise (
+            error if isinstance(error, ImageError | MissingFileError) else ImageError(f"{path}: damaged TIFF ({error})")
+        ) from error

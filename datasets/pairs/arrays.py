@@ -1,18 +1,20 @@
-"""Take a pair of arrays in memory as a data set of one scene."""
+"""Take arrays in memory as a data set of one scene: both views, or the left one with a disparity map."""
 
 import hashlib
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.datasets.arrays import ImageArray
+from semidense.datasets.arrays import DisparityMap, ImageArray
 from semidense.datasets.errors import DatasetError
 from semidense.datasets.formats.calibration.reading import read_cameras
 from semidense.datasets.pairs.images import harmonised
+from semidense.datasets.pairs.map_files import Reading, disparities, require_map
+from semidense.datasets.pairs.maps import read_once
 from semidense.datasets.pairs.options import PairOptions
 from semidense.datasets.pairs.pair import described
 from semidense.datasets.registry import Dataset
@@ -25,9 +27,21 @@ class ArrayPair(SceneSource):
 
     Attributes:
         views: The left and the right view, as `array_pair` made them.
+        given: The disparity map of another matcher, (y, x) as it was given; None without one.
     """
 
     views: tuple[ImageArray, ...] = field(default=(), compare=False, repr=False)
+    given: NDArray[Any] | None = field(default=None, compare=False, repr=False)
+
+    def has(self, role: str) -> bool:
+        """Tell whether a disparity map came with the scene."""
+        return role == "disparity" and self.given is not None
+
+    def load_map(self) -> DisparityMap:
+        """Return what the disparity map means."""
+        if self.given is None:
+            raise DatasetError(f"{self.name}: no disparity map was given")
+        return disparities("the disparity map", self.given, Reading(**self.map_reading))
 
     def load_images(self) -> tuple[ImageArray, ImageArray]:
         """Return both views."""
@@ -35,30 +49,43 @@ class ArrayPair(SceneSource):
 
     def identity(self, roles: Collection[str] | None = None) -> dict[str, Any]:
         """Name the content of the arrays."""
-        chosen = [(role, view) for role, view in zip(IMAGE_ROLES, self.views, strict=True)]
+        chosen = [
+            *zip(IMAGE_ROLES, self.views, strict=True),
+            *([("disparity", self.given)] if self.given is not None else []),
+        ]
         digests = {role: _digest(view) for role, view in chosen if roles is None or role in roles}
         return {"reader": self.reader, "files": digests, "parameters": {}}
 
 
-def array_pair(left: object, right: object, options: PairOptions, name: str = "pair") -> Dataset:
+def array_pair(
+    left: object, right: object | None, options: PairOptions, name: str = "pair", disparity: object | None = None
+) -> Dataset:
     """Make a data set of one pair of arrays.
 
     Args:
         left: (y, x) or (y, x, 3) RGB, or with a last axis of 1 or of 4 (RGB and alpha, which is dropped). Whole numbers
             from 0 to 65535 in any integer dtype and byte order; see `harmonised` for their range.
-        right: The right view, of the same height and width.
+        right: The right view, of the same height and width; None, if there is a disparity map, for none.
         options: What is known beside them.
         name: The scene's name.
+        disparity: (y, x) of any numbers: the left view's map by another matcher, read as ``options`` say.
 
     Raises:
         DatasetError: If an array is no image, or the two differ in size.
     """
-    views = (_as_image("left image", left), _as_image("right image", right))
+    first = _as_image("left image", left)
+    views = (first, np.zeros_like(first) if right is None else _as_image("right image", right))
     Scene(name, *harmonised(*views), None, DisparityRange(0, 0))
     calib = tuple(Path(file) for file in options.calib)
     known = read_cameras(calib, options.unit) if calib else None
     size = (int(views[0].shape[0]), int(views[0].shape[1]))
-    return Dataset("pair", (ArrayPair(**described(name, size, options, known), files={}, views=views),))
+    pair = ArrayPair(**described(name, size, options, known), files={}, views=views, one_view=right is None)
+    if disparity is None:
+        return Dataset("pair", (pair,))
+    given = require_map("the disparity map", np.asarray(disparity))
+    return Dataset(
+        "pair", (replace(read_once(pair, "the disparity map", given, options.scale, options.none), given=given),)
+    )
 
 
 def _as_image(what: str, given: object) -> ImageArray:
@@ -95,6 +122,6 @@ def _in_16_bits(what: str, array: NDArray[Any]) -> ImageArray:
     return array.astype(np.uint16)
 
 
-def _digest(view: ImageArray) -> str:
+def _digest(view: NDArray[Any]) -> str:
     header = f"{view.dtype.str} {view.shape} ".encode()
     return hashlib.sha256(header + np.ascontiguousarray(view).tobytes()).hexdigest()

@@ -19,7 +19,8 @@ _EIGHT_BITS = 8
 def read_images(files: Mapping[str, Path], parameters: Mapping[str, Parameter]) -> tuple[ImageArray, ImageArray]:
     """Read both views, alike in depth and bands; raises `DatasetError` if one cannot be read.
 
-    With ``parameters["split"]`` the file of the role ``left`` holds both views.
+    With ``parameters["split"]`` the file of the role ``left`` holds both views. Without a right view zeros stand in its
+    place.
     """
     if split := parameters.get("split"):
         whole = read_image(files["left"])
@@ -27,6 +28,9 @@ def read_images(files: Mapping[str, Path], parameters: Mapping[str, Parameter]) 
         if split == "side-by-side":
             return harmonised(whole[:, :columns], whole[:, columns:])
         return harmonised(whole[:rows], whole[rows:])
+    if "right" not in files:
+        left = read_image(files["left"])
+        return harmonised(left, np.zeros_like(left))
     return harmonised(*read_pair(files))
 
 

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeAlias
 
@@ -10,7 +10,7 @@ from semidense.datasets.errors import DatasetError
 
 SPLITS = ("side-by-side", "over-under")
 """How one picture may hold both views: left and right halves, or upper (left view) and lower (right view)."""
-PATTERN = "pair:LEFT,RIGHT or pair:LIST.csv or pair:FILE,split=side-by-side"
+PATTERN = "pair:LEFT,RIGHT or pair:LIST.csv or pair:FILE,split=side-by-side or pair:LEFT,disparity=FILE"
 _LINE_END = "\r\n"
 _Specification: TypeAlias = tuple[list[str], "PairOptions"]
 
@@ -27,6 +27,9 @@ class PairOptions:
         split: How one picture holds both views: one of `SPLITS`; None if each view has its own file.
         costs: A NumPy file with a cost volume (y, x, d) of the pair, which takes the place of the matching-Net's; its
             first disparity is ``d_min``.
+        disparity: A file with a disparity map of the left view, which takes the place of the raw disparity.
+        scale: Stored value of 1 px in that file; None: recognised.
+        none: Stored value of its pixels without a disparity; None: recognised.
 
     Raises:
         DatasetError: If ``split`` is not known.
@@ -38,6 +41,9 @@ class PairOptions:
     d_max: int | None = None
     split: str | None = None
     costs: str | None = None
+    disparity: str | None = None
+    scale: float | None = None
+    none: float | None = None
 
     def __post_init__(self) -> None:
         if self.split is not None and self.split not in SPLITS:
@@ -90,8 +96,12 @@ def _as_path(side: str) -> str:
 def _with(options: PairOptions, key: str, value: str) -> PairOptions:
     if key == "calib":
         return replace(options, calib=(*options.calib, value))
-    changed: dict[str, Any] = {key: _whole(key, value) if key in ("d_min", "d_max") else value}
+    changed: dict[str, Any] = {key: _READ.get(key, _text)(key, value)}
     return replace(options, **changed)
+
+
+def _text(_: str, value: str) -> str:
+    return value
 
 
 def _whole(key: str, value: str) -> int:
@@ -99,3 +109,14 @@ def _whole(key: str, value: str) -> int:
         return int(value)
     except ValueError as error:
         raise DatasetError(f"pair: {key}={value}; expected a whole number of pixels") from error
+
+
+def _number(key: str, value: str) -> float:
+    try:
+        return float(value)
+    except ValueError as error:
+        raise DatasetError(f"pair: {key}={value}; expected a number") from error
+
+
+_READ: Mapping[str, Callable[[str, str], Any]] = {"d_min": _whole, "d_max": _whole, "scale": _number, "none": _number}
+"""How the options that are numbers are read."""

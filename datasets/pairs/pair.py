@@ -7,6 +7,8 @@
     pair:camera/left,camera/right,calib=calib.txt             two folders, paired by name
     pair:shot*_L.jpg,shot*_R.jpg,calib=l.yaml,calib=r.yaml    two patterns, a ROS calibration
     pair:left.png,right.png,d_min=0,costs=volume.npy          one pair, with the costs of another matcher (y, x, d)
+    pair:left.png,right.png,disparity=map.png,scale=256       one pair, with the disparity map of another matcher
+    pair:left.png,disparity=map.pfm                           the same, without its right view
     pair:pairs.csv                                            lines left,right[,calibration]
     pair:video/,split=side-by-side                            every picture holds both views; or over-under
 
@@ -26,6 +28,7 @@ from semidense.datasets.formats.costs import costs_shape
 from semidense.datasets.formats.files import user_path
 from semidense.datasets.formats.images import image_size
 from semidense.datasets.pairs.lists import LISTS, read_list
+from semidense.datasets.pairs.maps import with_map
 from semidense.datasets.pairs.options import PATTERN, PairOptions, parse
 from semidense.datasets.pairs.pairing import Pair, find_pairs, image_files, pair_name
 from semidense.datasets.scene import DisparityRange, RangeEnd, SceneSource
@@ -39,11 +42,19 @@ def list_scenes(argument: str) -> tuple[SceneSource, ...]:
     """
     sides, options = parse(argument)
     pairs = _listed(sides, options)
-    if options.costs and len(pairs) > 1:
-        raise DatasetError(f"costs={options.costs}: a volume belongs to one pair, but there are {len(pairs)}; name one")
+    for key, file in (("costs", options.costs), ("disparity", options.disparity)):
+        if file and len(pairs) > 1:
+            raise DatasetError(f"{key}={file}: it belongs to one pair, but there are {len(pairs)}; name one")
     wanted = {_calibration_of(pair, options) for pair in pairs}
     known = {each: read_cameras(each[0], options.unit, each[1]) for each in wanted if each[0]}
-    return tuple(_source(pair, options, known.get(_calibration_of(pair, options))) for pair in pairs)
+    one_view = _is_one_view(sides, options)
+    return tuple(_source(pair, options, known.get(_calibration_of(pair, options)), one_view) for pair in pairs)
+
+
+def _is_one_view(sides: list[str], options: PairOptions) -> bool:
+    """Return whether a left view alone was given, with its disparity map."""
+    is_list = Path(sides[0]).suffix.lower() in LISTS
+    return options.disparity is not None and len(sides) == 1 and not options.split and not is_list
 
 
 def _listed(sides: list[str], options: PairOptions) -> list[Pair]:
@@ -54,6 +65,8 @@ def _listed(sides: list[str], options: PairOptions) -> list[Pair]:
     if len(sides) == 2:
         return find_pairs(*sides)
     path = user_path(sides[0])
+    if _is_one_view(sides, options):
+        return [Pair(pair_name(each), each, each) for each in image_files(sides[0])]
     if path.suffix.lower() not in LISTS:
         raise DatasetError(
             f"{path}: one path alone must be a list ({', '.join(LISTS)}), or both views with split=; write {PATTERN}"
@@ -67,13 +80,17 @@ def _calibration_of(pair: Pair, options: PairOptions) -> tuple[tuple[Path, ...],
     return files, str(pair.left.absolute().parent)
 
 
-def _source(pair: Pair, options: PairOptions, known: PairCalibration | None) -> SceneSource:
-    files = {"left": pair.left, "right": pair.right}
+def _source(pair: Pair, options: PairOptions, known: PairCalibration | None, one_view: bool) -> SceneSource:
+    files = {"left": pair.left} if one_view else {"left": pair.left, "right": pair.right}
     if options.costs:
         files["costs"] = user_path(options.costs)
         options = _with_range_of_costs(files["costs"], options)
-    source = SceneSource(**described(pair.name, _view_size(pair, options), options, known), files=files)
-    return replace(source, warnings=(*pair.warnings, *source.warnings))
+    about = described(pair.name, _view_size(pair, options), options, known)
+    source = SceneSource(**about, files=files, one_view=one_view)
+    source = replace(source, warnings=(*pair.warnings, *source.warnings))
+    if not options.disparity:
+        return source
+    return with_map(source, user_path(options.disparity), options.scale, options.none)
 
 
 def _with_range_of_costs(path: Path, options: PairOptions) -> PairOptions:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
-from semidense.pipeline.cli.commands import compare, match, rectify, run, show, submit
+from semidense.pipeline.cli.commands import compare, match, rectify, run, score, show, submit
 from semidense.pipeline.cli.commands.cache.commands import cache_app
 from semidense.pipeline.cli.commands.data import commands as data
 from semidense.stages.compute.allocator import keep_freed_memory
@@ -53,7 +53,7 @@ def _options(
     """Take the options that stand before a command."""
 
 
-for commands in (run, match, rectify, compare, show, data, submit):
+for commands in (run, match, score, rectify, compare, show, data, submit):
     commands.register(app)
 app.add_typer(cache_app, name="cache")
 

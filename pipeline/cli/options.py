@@ -85,6 +85,7 @@ ForceOption = Annotated[
 DryRunOption = Annotated[
     bool, typer.Option("--dry-run", help="Print what would be reused and what would be made, and make nothing.")
 ]
+FormatOption = Annotated[str, typer.Option("--format", help="Formats of the maps, with commas.")]
 ProductArgument = Annotated[str, typer.Argument(help="A product, such as costvolume, disparity or confidence.")]
 
 
@@ -116,3 +117,42 @@ def _recorded_preset(file: Path) -> str | None:
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return None
     return found if isinstance(found, str) else None
+
+
+_EXAMPLES = {"density": "80% or 0.8", "max-error": "2% or 0.02"}
+"""Shares as they are typed, by option."""
+
+
+def share(name: str, text: str | None) -> float | None:
+    """Return what ``80%`` or ``0.8`` means.
+
+    Raises:
+        UsageError: if it is no share above 0 and up to 1.
+    """
+    if text is None:
+        return None
+    from semidense.pipeline.plan.errors import UsageError
+
+    try:
+        value = float(text[:-1]) / 100 if text.endswith("%") else float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0 < value <= 1:
+        raise UsageError(f"{name} {text!r}: write a share of the pixels, such as {_EXAMPLES[name]}")
+    return value
+
+
+def map_formats(text: str) -> list[str]:
+    """Return the formats of maps that a text with commas names.
+
+    Raises:
+        UsageError: if there is no such format; the nearest is given.
+    """
+    from semidense.pipeline.files.map_files import FORMATS
+    from semidense.pipeline.plan.errors import UsageError, nearest
+
+    chosen = list(dict.fromkeys(kind.strip() for kind in text.split(",") if kind.strip()))
+    for kind in chosen:
+        if kind not in FORMATS:
+            raise UsageError(f"no format {kind!r}; {nearest(kind, FORMATS)}")
+    return chosen

@@ -11,6 +11,7 @@ import numpy as np
 
 from semidense.pipeline.api import Task, carry_out
 from semidense.pipeline.comparison.ablation import ablation_rows
+from semidense.pipeline.comparison.maps import map_rows
 from semidense.pipeline.comparison.methods import LOWERED, MATCHERS, matcher_rows, measure_rows, ours
 from semidense.pipeline.comparison.prepared import EXPERIMENTS, Prepared, prepare
 from semidense.pipeline.comparison.rows import (
@@ -77,6 +78,7 @@ def compare(
     protocols: Sequence[str] = (),
     *,
     without: Sequence[str] = (),
+    maps: Mapping[str, str] | None = None,
     watch: Watch | None = None,
     scheduler: str | None = None,
     workers: int | None = None,
@@ -91,6 +93,8 @@ def compare(
         protocols: of ``PROTOCOLS``: the paper's own, by which both networks are trained and tested beside ours.
         without: products of other matchers and measures that are left out, such as ``mc_cnn_accurate``; with
             ``ablation``, no matching-Nets with different channels are trained.
+        maps: files with the maps of further matchers, by name: ``PATTERN[,scale=S][,none=V]`` with one ``*`` for the
+            scene's name. They are scored by the preset ``foreign``.
         watch: as for ``run``.
         scheduler: as for ``run``.
         workers: as for ``run``.
@@ -99,7 +103,7 @@ def compare(
         UsageError, DatasetError, CacheError, StageError: what the user can mend, in one line.
     """
     task = Task(task) if isinstance(task, str) else task
-    prepared = prepare(task, experiments, train_on, protocols, without=without)
+    prepared = prepare(task, experiments, train_on, protocols, without=without, maps=maps)
     return carry_out_comparison(prepared, watch=watch, scheduler=scheduler, workers=workers)
 
 
@@ -117,6 +121,8 @@ def carry_out_comparison(
         rows += ablation_rows(make(prepared.ablation))
     for name, wanted in prepared.named:
         rows += _named(_rows(make(wanted), prepared.experiments), name)
+    for name, wanted in prepared.maps:
+        rows += _map_rows(name, make(wanted), result, prepared.experiments)
     return Comparison(rows, prepared.unavailable, (*prepared.notes, *result.plan.notes), result)
 
 
@@ -139,6 +145,16 @@ def _rows(result: Result, experiments: Sequence[str]) -> Iterator[Row]:
         judged = Judged(scene, products["truth"])
         for experiment in experiments:
             yield from _EXPERIMENT[experiment](judged, products, made["semidense"].step.R)
+
+
+def _map_rows(name: str, found: Result, own: Result, experiments: Sequence[str]) -> Iterator[Row]:
+    """Yield the rows of maps from files, beside those of our own map."""
+    beside = _asked(own)
+    for scene, made in _asked(found).items():
+        products = _read(found, made)
+        yield from map_rows(
+            name, Judged(scene, products["truth"]), products, ours(_read(own, beside[scene])), experiments
+        )
 
 
 def _named(rows: Iterable[Row], name: str) -> Iterator[Row]:

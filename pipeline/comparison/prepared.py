@@ -1,12 +1,13 @@
 """What a comparison will make: one request for each kind of run, and what cannot be made."""
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from semidense.datasets import Dataset, SceneSource, open_dataset
 from semidense.pipeline.api import Task, planned
 from semidense.pipeline.comparison.ablation import ABLATION, ablation_request
+from semidense.pipeline.comparison.maps import map_requests
 from semidense.pipeline.comparison.methods import MATCHERS, MEASURES
 from semidense.pipeline.comparison.paper_figures import NAMED
 from semidense.pipeline.comparison.protocols import PROTOCOLS, protocol_requests, require_protocols
@@ -47,6 +48,7 @@ class Prepared:
         own: the request with the task's settings, and with every other matcher and measure.
         ablation: the request for matching-Nets that see different channels; None if they are left out.
         named: further requests, each with the name that its rows get.
+        maps: requests that score the maps of further matchers, each with the matcher's name.
         unavailable: ``method`` and ``why`` of what will not be run.
         notes: what a person should know.
     """
@@ -56,12 +58,13 @@ class Prepared:
     own: Request
     ablation: Request | None
     named: tuple[tuple[str, Request], ...]
+    maps: tuple[tuple[str, Request], ...]
     unavailable: list[dict[str, str]]
     notes: tuple[str, ...]
 
     def plan(self) -> Plan:
         """Return the plan of all runs as one, with each product once. Nothing is made."""
-        requests = (self.own, self.ablation, *(request for _, request in self.named))
+        requests = (self.own, self.ablation, *(request for _, request in (*self.named, *self.maps)))
         plans = [planned(self.task, request) for request in requests if request]
         steps = {each.step.id: each for plan in plans for each in plan.steps}
         return Plan(tuple(steps.values()), plans[0].targets, (*self.notes, *plans[0].notes))
@@ -74,6 +77,7 @@ def prepare(
     protocols: Sequence[str] = (),
     *,
     without: Sequence[str] = (),
+    maps: Mapping[str, str] | None = None,
 ) -> Prepared:
     """Return what a comparison will make; arguments and errors are those of ``compare``."""
     _require(task, experiments)
@@ -90,7 +94,8 @@ def prepare(
     trained = "raw" in experiments and not _no_ablation(bool(training), without)
     ablation = ablation_request(task, dataset, training) if trained else None
     named = (*_beside(task, dataset, training), *lenient)
-    return Prepared(task, tuple(experiments), request, ablation, named, unavailable, tuple(notes))
+    given = tuple(map_requests(task, dataset, maps or {}, ALWAYS))
+    return Prepared(task, tuple(experiments), request, ablation, named, given, unavailable, tuple(notes))
 
 
 def _beside(task: Task, dataset: Dataset, training: tuple[SceneSource, ...]) -> Iterator[tuple[str, Request]]:

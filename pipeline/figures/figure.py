@@ -24,7 +24,12 @@ from semidense.pipeline.figures.maps import (
 )
 from semidense.pipeline.figures.metrics_table import draw_metrics
 from semidense.pipeline.figures.survey import draw_survey
-from semidense.pipeline.figures.training import draw_evaluation_samples, draw_matching_samples, draw_network
+from semidense.pipeline.figures.training import (
+    draw_evaluation_samples,
+    draw_foreign_samples,
+    draw_matching_samples,
+    draw_network,
+)
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.opening import recorded
 
@@ -52,6 +57,9 @@ _DRAW: Mapping[str, Callable[..., None]] = {
     "evidence_net": draw_network,
     "confidence": draw_confidence,
     "evidence_confidence": draw_confidence,
+    "foreign_samples": draw_foreign_samples,
+    "foreign_net": draw_network,
+    "foreign_confidence": draw_confidence,
     "calibration": draw_calibration,
     "calibrated_confidence": draw_confidence,
     "semidense": draw_disparity,

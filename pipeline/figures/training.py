@@ -15,11 +15,14 @@ from semidense.pipeline.figures.colours import BLUE, ORANGE, QUIET, RED, SKY
 from semidense.pipeline.figures.drawing import disparity_scale, draw_classes, legend_below, none_patch, share_patch
 from semidense.pipeline.results.opening import recorded
 from semidense.stages.evaluation.declaration import STRIDE
+from semidense.stages.evaluation.evidence.foreign.declaration import KINDS
 
 _SHOWN = 6
 """Crops or grids in a figure."""
 _MOST = 2000
 """Most samples that a figure reads; of more, this many at even distances."""
+RIGHT = 1.0
+"""Largest error of a pixel that is drawn as right, px."""
 _CLASSES = {-1: ("unknown", QUIET), 0: ("wrong", RED), 1: ("right", BLUE)}
 """Name and colour of each label."""
 
@@ -196,3 +199,18 @@ def trailing_mean(values: NDArray[np.float32], window: int) -> NDArray[np.float6
     [2.0, 4.0]
     """
     return np.convolve(values.astype(np.float64), np.full(window, 1 / window), mode="valid")
+
+
+def draw_foreign_samples(figure: Figure, dataset: xr.Dataset) -> None:
+    """Draw how many pixels of each kind of map are learnt from, and how many of them are wrong."""
+    kind, wrong = dataset["kind"].values, dataset["error"].values > RIGHT
+    all_of = np.bincount(kind, minlength=len(KINDS))
+    wrong_of = np.bincount(kind[wrong], minlength=len(KINDS))
+    axes = figure.add_subplot()
+    places = range(len(KINDS))
+    axes.barh(places, all_of, color=BLUE, label=f"right within {RIGHT:g} px")
+    axes.barh(places, wrong_of, color=RED, label="wrong")
+    axes.set_yticks(places, KINDS)
+    axes.invert_yaxis()
+    axes.set(xlabel="samples", title=f"{kind.size:,} samples by kind of map, {100 * wrong.mean():.1f} % wrong")
+    axes.legend(fontsize="small")

@@ -204,7 +204,7 @@ class _Writer:
 
 def _basis(match: Match) -> dict[str, Any]:
     """Return where R comes from; for a wanted error, what to expect and what it came to in training scenes."""
-    if not match.basis:
+    if match.wishes.max_error is None:
         return {
             "R_from": "from the pair's own confidences, for the density asked for" if match.wishes.density else "as set"
         }
@@ -212,20 +212,27 @@ def _basis(match: Match) -> dict[str, Any]:
     words = "no pixel is sure enough for that error" if expected is None else f"R = {told(match.R)}"
     return {
         "R_from": "for the error asked for",
-        "R_basis": f"{words}; {match.basis.words}",
+        "R_basis": f"{words}; {match.basis.words}" if match.basis else words,
         "expected_error_percent": None if expected is None else 100 * expected,
     }
 
 
 def _calibration_notes(match: Match) -> list[str]:
     """Say so if the calibration was measured with other cost volumes than those of the match."""
-    if not match.wishes.calibrated and match.wishes.max_error is None:
+    if match.scene.has("disparity") or (not match.wishes.calibrated and match.wishes.max_error is None):
         return []
     mode = match.made("costvolume").step.settings.get("mode")
     shipped = getattr(match.made("calibration").step.argument, "name", "")
     if (mode, shipped) != ("fast", "calibration"):
         return []
     return ["the calibration was measured with exact cost volumes, and is used for these fast ones"]
+
+
+def _given_map(scene: SceneSource) -> dict[str, Any]:
+    """Return where the raw map came from and how it was read, if another matcher made it."""
+    if not scene.has("disparity"):
+        return {}
+    return {"map": str(scene.files.get("disparity", "an array")), "map_reading": dict(scene.map_reading)}
 
 
 def summary(match: Match) -> dict[str, Any]:
@@ -236,7 +243,8 @@ def summary(match: Match) -> dict[str, Any]:
     return {
         "pair": match.scene.name,
         "left": str(match.scene.files.get("left", "an array")),
-        "right": str(match.scene.files.get("right", "an array")),
+        "right": None if match.scene.one_view else str(match.scene.files.get("right", "an array")),
+        **_given_map(match.scene),
         "rows": match.scene.size[0],
         "columns": match.scene.size[1],
         "reference_view": "left",

@@ -1,7 +1,6 @@
 """Build the steps of a request: what each product is made from, and with which settings.
 
-Several configurations share the steps in which they agree, so a sweep computes nothing twice. Nothing here looks at a
-cache.
+Several configurations share the steps in which they agree, so a sweep computes nothing twice. No cache is looked at.
 """
 
 import hashlib
@@ -17,7 +16,7 @@ from semidense.datasets import SceneSource
 from semidense.pipeline.plan.config import Config, one_line
 from semidense.pipeline.plan.environment import environment
 from semidense.pipeline.plan.errors import UsageError, nearest
-from semidense.pipeline.plan.images_and_truth import Source, source_of
+from semidense.pipeline.plan.images_and_truth import Source, require_views, source_of
 from semidense.pipeline.plan.shipped_weights import Weights, weights_of, weights_stage
 from semidense.pipeline.plan.steps import (
     SPLIT,
@@ -55,7 +54,7 @@ def build(request: Request) -> Graph:
         builder = _Builder(graph, config, request)
         graph.targets += [(step_id, variant) for step_id in _targets(builder, trained_on)]
     graph.steps = dict(sorted(graph.steps.items(), key=lambda item: place(item[1].product)))
-    graph.notes = list(dict.fromkeys(graph.notes))
+    graph.notes = [*dict.fromkeys(graph.notes)]
     if not graph.targets:
         raise UsageError(f"{request.dataset.spec}: no scene is left to work on; {'; '.join(graph.notes)}")
     return graph
@@ -131,6 +130,8 @@ class _Builder:
         stage, params = self._chosen(product)
         if "channels" in stage.inputs:
             require_trainable(self.config, product)
+        params = resolved(params, scene)
+        require_views(stage, scene)
         needed = getattr(params, "inputs", stage.inputs)
         if scene and "calibration" in needed and source_of("costvolume", scene):
             self._require_own_calibration(scene)
@@ -186,7 +187,7 @@ class _Builder:
         every = zip(self.request.training, params.fold_of_scene or (), strict=True)
         folds = tuple(fold for scene, fold in every if scene in self._mapped())
         params = params.model_copy(update={"fold_of_scene": folds})
-        return replace(self, config=config)._add_stage(stage, params, None, inputs)
+        return replace(self, config=config)._add_stage(stage, resolved(params, None), None, inputs)
 
     def _mapped(self) -> list[SceneSource]:
         """Return the training scenes whose maps are learnt from; a fold has those that the whole has."""
@@ -210,12 +211,11 @@ class _Builder:
     def _add_source(self, source: Source, scene: SceneSource) -> str:
         identity = source.identity(scene)
         known = replace(scene, digests=identity["files"])  # what is read must be what the key names
-        return self._add(source.stage, scene, known, identity, {}, scene.reader)
+        return self._add(source.stage, scene, known, identity, {}, source.reader or scene.reader)
 
     def _add_stage(
         self, stage: Stage, params: Params, scene: SceneSource | None, inputs: Mapping[str, tuple[str, ...]]
     ) -> str:
-        params = resolved(params, scene)
         settings = params.model_dump(mode="json") | {"tiles": stage.tiling(params)}
         return self._add(stage, scene, params, settings, inputs)
 
@@ -265,6 +265,8 @@ def resolved(params: Params, scene: SceneSource | None) -> Params:
     update: dict[str, Any] = {}
     if scene:
         _require_within(params, scene)
+    if scene and getattr(params, "right", False) is None:
+        update["right"] = not scene.one_view
     if hasattr(params, "precision"):
         update["precision"] = resolve(params.precision, transformed=getattr(params, "transformed", False))
     if scene and getattr(params, "d_min", 0) is None:
@@ -293,7 +295,5 @@ def require_trainable(config: Config, product: str) -> None:
         UsageError: if the product's ``relight`` is on and ``channels.use`` leaves gray out.
     """
     if getattr(config.section(product), "relight", 0) and "gray" not in config.of("channels", ChannelsParams).use:
-        raise UsageError(
-            f"{product}.relight changes the light of the gray channel, which channels.use leaves out: "
-            f"set {product}.relight=0"
-        )
+        told = f"{product}.relight changes the light of the gray channel, which channels.use leaves out"
+        raise UsageError(f"{told}: set {product}.relight=0")

@@ -1,4 +1,4 @@
-"""Products that are read, not computed: the images and the truth of a scene, and costs that another matcher made.
+"""Products that are read, not computed: a scene's images and truth, and costs or a map that another matcher made.
 
 They are cached like all others, so that every stage below reads from the cache alone, wherever it runs,
 and a source file that changes makes stale exactly what depends on it. Their functions are given the
@@ -52,6 +52,13 @@ COSTS = Stage(
     compute="semidense.pipeline.plan.images_and_truth:read_costs",
 )
 
+EXTERNAL = Stage(
+    product="disparity",
+    inputs=(),
+    outputs=(Output("disparity", ("y", "x"), "float32", "px", "disparity of another matcher; NaN: none"),),
+    compute="semidense.pipeline.plan.images_and_truth:read_external",
+)
+
 
 @dataclass(frozen=True)
 class Source:
@@ -61,11 +68,13 @@ class Source:
         stage: its declaration.
         identity: names the content that it is read from, for the key.
         role: of the file without which it is not read but computed; None: it is always read.
+        reader: module that reads it; empty: the scene's.
     """
 
     stage: Stage
     identity: Callable[[SceneSource], Mapping[str, Any]]
     role: str | None = None
+    reader: str = ""
 
 
 def _truth_identity(scene: SceneSource) -> dict[str, Any]:
@@ -74,13 +83,18 @@ def _truth_identity(scene: SceneSource) -> dict[str, Any]:
 
 
 def _costs_identity(scene: SceneSource) -> dict[str, Any]:
-    return scene.costs_identity() | {"d_min": scene.disparities.minimum}
+    return scene.identity(("costs",)) | {"d_min": scene.disparities.minimum}
+
+
+def _map_identity(scene: SceneSource) -> dict[str, Any]:
+    return scene.identity(("disparity",)) | {"reading": dict(scene.map_reading)}
 
 
 SOURCES = {
     "images": Source(IMAGES, SceneSource.image_identity),
     "truth": Source(TRUTH, _truth_identity),
     "costvolume": Source(COSTS, _costs_identity, role="costs"),
+    "disparity": Source(EXTERNAL, _map_identity, role="disparity", reader="semidense.datasets.pairs.map_files"),
 }
 """By product."""
 
@@ -88,7 +102,17 @@ SOURCES = {
 def source_of(product: str, scene: SceneSource) -> Source | None:
     """Return how a product of a scene is read; None if it is computed."""
     found = SOURCES.get(product)
-    return found if found and (found.role is None or found.role in scene.files) else None
+    return found if found and (found.role is None or scene.has(found.role)) else None
+
+
+def require_views(stage: Stage, scene: SceneSource | None) -> None:
+    """Refuse to look at the right view of a scene that has none.
+
+    Raises:
+        StageError: if the stage does.
+    """
+    if scene and scene.one_view and "images" in stage.inputs and not stage.one_view:
+        raise StageError(f"{scene.name}: {stage.product} needs the right view, which was not given")
 
 
 def read_costs(scene: SceneSource, _: Inputs) -> dict[str, Array]:
@@ -97,6 +121,11 @@ def read_costs(scene: SceneSource, _: Inputs) -> dict[str, Array]:
     matched = np.arange(cost.shape[1])[:, None] - d  # column of the right view
     cost[:, (matched < 0) | (matched >= cost.shape[1])] = np.nan
     return {"cost": cost, "d": d}
+
+
+def read_external(scene: SceneSource, _: Inputs) -> dict[str, Array]:
+    """Return the disparity map that came with a scene."""
+    return {"disparity": scene.load_map()}
 
 
 def read_images(scene: SceneSource, _: Inputs) -> dict[str, Array]:

@@ -292,5 +292,7 @@ CCNN = Stage(
     border="edge",
 )
 
-BASELINES = (SGM, CENSUS, SNCC, MC_CNN, MC_CNN_ACCURATE, COST_CONFIDENCE, O1_FOREST, O1, CCNN_NET, CCNN)
-"""All of them, in an order in which each comes after what it is made from."""
+MATCHED = (SGM, CENSUS, SNCC, MC_CNN, MC_CNN_ACCURATE)
+"""Other matchers, which are made from the images alone."""
+BASELINES = (COST_CONFIDENCE, O1_FOREST, O1, CCNN_NET, CCNN)
+"""Other confidence measures, in an order in which each comes after what it is made from."""

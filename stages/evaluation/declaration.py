@@ -183,4 +183,5 @@ CONFIDENCE = Stage(
     tile_rows=256,
     halo=lambda _: RADIUS,
     border="edge",
+    one_view=True,
 )

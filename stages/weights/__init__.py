@@ -17,6 +17,7 @@ from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 from torch import nn
 
+from semidense.stages.evaluation.evidence.foreign.features import FEATURES
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.parameters import count, from_vector, to_vector
@@ -45,8 +46,11 @@ def candidates(product: str) -> list[nn.Module]:
         return [DescriptorNet(channels) for channels in range(1, MOST_CHANNELS + 1)]
     if product == "evidence_net":
         return [EvidenceNet()]
+    if product == "foreign_net":
+        return [EvidenceNet(len(FEATURES))]
     raise StageError(
-        f"{product} is no network: weights are those of matching_net, descriptor_net, evaluation_net or evidence_net"
+        f"{product} is no network: weights are those of matching_net, descriptor_net, evaluation_net, evidence_net or "
+        "foreign_net"
     )
 
 

@@ -85,7 +85,7 @@ def test_describe_lists_what_open_dataset_takes() -> None:
     patterns = [pattern for pattern, _ in describe()]
     assert patterns == [
         *("motorcycle", "middlebury:DIR", "kitti2012:DIR", "kitti2015:DIR", "eth3d:DIR", "synthetic[:KEY=VALUE,...]"),
-        *("pair:LEFT,RIGHT[,KEY=VALUE,...]", "toml:FILE"),
+        *("pair:LEFT,RIGHT[,KEY=VALUE,...]", "map:PATTERN[,KEY=VALUE,...]@DATASET", "toml:FILE"),
     ]
     assert all(description for _, description in describe())
 

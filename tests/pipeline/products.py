@@ -70,6 +70,15 @@ def evaluation_samples() -> xr.Dataset:
     )
 
 
+def foreign_samples() -> xr.Dataset:
+    return xr.Dataset(
+        {
+            "kind": ("sample", np.repeat(np.arange(4, dtype=np.int8), 5)),
+            "error": ("sample", np.tile(np.float32([0, 0.5, 1, 2, 9]), 4)),
+        }
+    )
+
+
 def network() -> xr.Dataset:
     return xr.Dataset(
         {
@@ -170,6 +179,9 @@ PRODUCTS: dict[str, Callable[[], xr.Dataset]] = {
     "evidence_net": shipped,
     "confidence": confidence,
     "evidence_confidence": confidence,
+    "foreign_samples": foreign_samples,
+    "foreign_net": shipped,
+    "foreign_confidence": confidence,
     "calibration": calibration,
     "calibrated_confidence": confidence,
     "semidense": disparity,

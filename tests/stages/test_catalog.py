@@ -6,13 +6,13 @@ from typing import get_args, get_origin, get_type_hints
 
 import pytest
 
-from semidense.stages.baselines.declaration import BASELINES
+from semidense.stages.baselines.declaration import BASELINES, MATCHED
 from semidense.stages.catalog import CATALOG, STAGES
 from semidense.stages.stage import Stage
 
 READ = {"images", "truth"}
 """Products that no stage makes."""
-ALL = (*CATALOG, *BASELINES)
+ALL = (*MATCHED, *CATALOG, *BASELINES)
 stages = pytest.mark.parametrize("stage", ALL, ids=lambda stage: stage.product)
 
 

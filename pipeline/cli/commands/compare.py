@@ -1,5 +1,6 @@
 """The command ``compare``. Nothing heavy is imported before it runs."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -58,6 +59,14 @@ def compare(
             "channels. May be repeated.",
         ),
     ] = None,
+    maps: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map",
+            help="Also score the maps of another matcher: NAME=PATTERN, a path with * for the scene's name; add "
+            ",scale=256 or ,none=-1 if the files do not tell. May be repeated.",
+        ),
+    ] = None,
     threshold: Annotated[
         float, typer.Option("--threshold", help="Error in px above which tables and figures call a pixel wrong.")
     ] = 1.0,
@@ -96,7 +105,9 @@ def compare(
         raise UsageError(f"--threshold {threshold:g}: figures are worked out for {offered} px")
     named = chosen_preset(preset, config)
     task = api.Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, named)
-    prepared = prepare(task, experiment or EXPERIMENTS, train_on, protocol or (), without=without or ())
+    prepared = prepare(
+        task, experiment or EXPERIMENTS, train_on, protocol or (), without=without or (), maps=_named_maps(maps or ())
+    )
     store = api.open_store(cache)
     if dry_run:
         return console.show_plan(prepared.plan(), store, as_json)
@@ -112,3 +123,20 @@ def compare(
         typer.echo(f"wrote {file}")
     typer.echo(console.reuse_line(found.result.made.values()))
     return None
+
+
+def _named_maps(texts: Sequence[str]) -> dict[str, str]:
+    """Return what ``NAME=PATTERN`` says, by name.
+
+    Raises:
+        UsageError: if a text has another form, or a name comes twice.
+    """
+    from semidense.pipeline.plan.errors import UsageError
+
+    named: dict[str, str] = {}
+    for text in texts:
+        name, _, pattern = text.partition("=")
+        if not (name and pattern) or name in named:
+            raise UsageError(f"--map {text}: write NAME=PATTERN, such as raft=raft/*.pfm, each name once")
+        named[name] = pattern
+    return named

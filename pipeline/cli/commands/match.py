@@ -22,6 +22,8 @@ from semidense.pipeline.cli.options import (
     chosen,
     chosen_preset,
     config_file,
+    map_formats,
+    share,
 )
 from semidense.pipeline.plan.presets import OWN_PAIRS
 
@@ -29,8 +31,6 @@ if TYPE_CHECKING:
     from semidense.pipeline.api import Task
     from semidense.pipeline.pairs.match import Match
     from semidense.pipeline.pairs.wishes import Wishes
-
-_EXAMPLES = {"density": "80% or 0.8", "max-error": "2% or 0.02"}
 
 
 def register(app: typer.Typer) -> None:
@@ -140,15 +140,15 @@ def match(
     )
     wishes = Wishes(
         R=threshold,
-        density=_share("density", density),
-        max_error=_share("max-error", max_error),
+        density=share("density", density),
+        max_error=share("max-error", max_error),
         calibrated=calibrated,
         left_right=left_right,
         subpixel=subpixel,
         fill=fill,
         right_view=right_view,
     )
-    kinds = _formats(formats)
+    kinds = map_formats(formats)
     if dry_run:
         _plan(task, wishes, as_json)
     else:
@@ -203,7 +203,7 @@ def _say(match: "Match", about: dict[str, Any]) -> None:
     print(f"{match.scene.name}: {about['rows']} x {about['columns']} px, disparities {low} to {high} px{ends}")
     kept = about["density_percent"] - about["guessed_percent"]
     print(f"  kept {kept:.1f} % of the pixels, at R = {told(match.R)} ({about['R_from']})")
-    if match.basis:
+    if "R_basis" in about:
         print(f"  {about['R_basis']}")
     if match.wishes.fill:
         print(f"  {about['guessed_percent']:.1f} % are filled in: guesses (guessed.png)")
@@ -229,33 +229,3 @@ def _results(found: "Sequence[Match]") -> list[Any]:
         for made in run.made.values():
             first.setdefault(made.key, made)
     return list(first.values())
-
-
-def _share(name: str, text: str | None) -> float | None:
-    """Return what ``80%`` or ``0.8`` means.
-
-    Raises:
-        UsageError: if it is no share above 0 and up to 1.
-    """
-    if text is None:
-        return None
-    from semidense.pipeline.plan.errors import UsageError
-
-    try:
-        value = float(text[:-1]) / 100 if text.endswith("%") else float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0 < value <= 1:
-        raise UsageError(f"{name} {text!r}: write a share of the pixels, such as {_EXAMPLES[name]}")
-    return value
-
-
-def _formats(text: str) -> list[str]:
-    from semidense.pipeline.files.map_files import FORMATS
-    from semidense.pipeline.plan.errors import UsageError, nearest
-
-    chosen = list(dict.fromkeys(kind.strip() for kind in text.split(",") if kind.strip()))
-    for kind in chosen:
-        if kind not in FORMATS:
-            raise UsageError(f"no format {kind!r}; {nearest(kind, FORMATS)}")
-    return chosen

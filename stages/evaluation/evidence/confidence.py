@@ -17,7 +17,7 @@ from semidense.stages.learning.parameters import from_vector
 @one_thread()
 def weigh(parameters: NDArray[np.float32], stacked: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the log-odds (y, x) that each disparity is right, of features (feature, y, x)."""
-    net = EvidenceNet()
+    net = EvidenceNet(len(stacked))
     from_vector(net, parameters)
     with torch.inference_mode():
         rows = np.ascontiguousarray(stacked.reshape(len(stacked), -1).T)

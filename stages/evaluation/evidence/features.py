@@ -52,7 +52,7 @@ def features(images: Images, disparity: Mapping[str, Any], evaluation_net: Netwo
     if "evidence" not in disparity:
         raise StageError("the disparity map brings no evidence of its costs: set use.disparity=aggregated")
     evidence = np.nan_to_num(disparity["evidence"].astype(np.float32))
-    log_odds = _log_odds(images, disparity["disparity"], evaluation_net, precision)
+    log_odds = network_log_odds(images, disparity["disparity"], evaluation_net, precision)
     agreements = [padded_agreement(disparity["disparity"], window) for window in WINDOWS]
     shares = [_share(evidence[_AGREES] > 0, window) for window in WINDOWS]
     own = evidence[:, RADIUS:-RADIUS, RADIUS:-RADIUS]
@@ -71,9 +71,10 @@ def of_whole_map(
     return features(views, padded, evaluation_net, precision)
 
 
-def _log_odds(
+def network_log_odds(
     images: Images, disparity: NDArray[np.float32], evaluation_net: Network, precision: Precision
 ) -> NDArray[np.float32]:
+    """Return the evaluation-Net's log-odds (y, x) of a map, of arrays with 50 px of context all round."""
     net = EvaluationNet()
     from_vector(net, evaluation_net["parameters"])
     net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]

@@ -12,17 +12,21 @@ HIDDEN = 32
 
 
 class EvidenceNet(nn.Module):
-    """From what is known of a pixel to the log-odds that its disparity is right: two hidden layers of 32 units."""
+    """From what is known of a pixel to the log-odds that its disparity is right: two hidden layers of 32 units.
+
+    Args:
+        inputs: numbers that are known of a pixel; by default those of a map by our own summed costs.
+    """
 
     centre: Tensor
     scale: Tensor
 
-    def __init__(self) -> None:
+    def __init__(self, inputs: int = INPUTS) -> None:
         super().__init__()
         # The inputs' mean and deviation in training, kept with the weights.
-        self.register_buffer("centre", torch.zeros(INPUTS))
-        self.register_buffer("scale", torch.ones(INPUTS))
-        self.first = nn.Linear(INPUTS, HIDDEN)
+        self.register_buffer("centre", torch.zeros(inputs))
+        self.register_buffer("scale", torch.ones(inputs))
+        self.first = nn.Linear(inputs, HIDDEN)
         self.second = nn.Linear(HIDDEN, HIDDEN)
         self.out = nn.Linear(HIDDEN, 1)
 

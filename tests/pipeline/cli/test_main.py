@@ -15,7 +15,7 @@ from tests.tiny import PATH, SPEC, TEST_ONLY, TRAINED
 
 Invoke = Callable[..., Any]
 COMMANDS = (
-    *("run", "sweep", "status", "explain", "inspect", "report", "view"),
+    *("run", "sweep", "status", "explain", "inspect", "match", "score", "compare", "report", "view"),
     *("cache ls", "cache verify", "cache size", "data list", "data fetch", "data check", "submit"),
 )
 STEP_KEYS = ["product", "scene", "key", "state", "changed", "why", "seconds"]

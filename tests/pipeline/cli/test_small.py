@@ -6,7 +6,8 @@ from semidense.stages.catalog import CATALOG, READ
 from tests.pipeline.products import PRODUCTS
 
 MAPS = {"images", "truth", "disparity", "semidense", "right_disparity", "refined", "filled"}
-MAPS |= {"confidence", "calibrated_confidence", "aggregated", "right_aggregated", "evidence_confidence"}
+MAPS |= {"confidence", "calibrated_confidence", "aggregated", "right_aggregated"}
+MAPS |= {"evidence_confidence", "foreign_confidence"}
 
 DATAFLOW = (*READ, *(stage.product for stage in CATALOG))
 

@@ -54,6 +54,11 @@ def test_every_product_of_the_pipeline_has_a_figure() -> None:
             id="histograms-and-crops",
         ),
         pytest.param(
+            "foreign_samples",
+            ["20 samples by kind of map, 40.0 % wrong", "sgm, dense", "summed costs, blurred", "right within 1 px"],
+            id="kinds-of-maps",
+        ),
+        pytest.param(
             "matching_net",
             ["training step", "nats, log scale", "each step", "mean of the last 4 steps", "ln 2"],
             id="trained-net-has-a-curve",

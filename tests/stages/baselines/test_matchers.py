@@ -10,6 +10,7 @@ import torch
 from semidense.stages.baselines.declaration import (
     BASELINES,
     CENSUS,
+    MATCHED,
     MC_CNN,
     MC_CNN_ACCURATE,
     SGM,
@@ -130,7 +131,7 @@ def test_settings_that_make_no_sense_are_refused(stage: Stage, settings: dict[st
 
 def test_only_what_comes_with_the_extra_is_needed() -> None:
     extra = {"opencv-python-headless", "mccnn", "scikit-learn"}
-    assert {name for stage in BASELINES for name in stage.needs} == extra
+    assert {name for stage in (*MATCHED, *BASELINES) for name in stage.needs} == extra
     assert SgmParams().p2 > SgmParams().p1
 
 

@@ -1,0 +1,100 @@
+"""Our costs of a map that another matcher made: of the cells at and beside its disparities, and of no other."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from semidense.stages.compute.kernel import kernel
+from semidense.stages.compute.precision import Precision, dtype_of
+from semidense.stages.compute.threads import one_thread
+from semidense.stages.evaluation.declaration import RADIUS
+from semidense.stages.matching.declaration import REACH
+from semidense.stages.matching.descriptors.net import descriptor_net_from_parameters
+from semidense.stages.matching.descriptors.transformed import kernels_of, transformed_descriptors
+from semidense.stages.stage import Network
+
+OFFSETS = range(-2, 4)
+"""Cells of a pixel: whole disparities from 2 px below the one at or below its own to 3 px above it."""
+
+
+@dataclass(frozen=True)
+class Described:
+    """Both views of a block with 50 px of context all round, as descriptors: whatever its map, they are the same.
+
+    Attributes:
+        left: (y + 84, x + 84, 64) float32 of unit length: the block without its outer 8 px.
+        right: the same of the right view.
+        scale: log-odds of a mismatch by which a dot product of 1 is lower than one of 0.
+        bias: log-odds of a dot product of 0.
+    """
+
+    left: NDArray[np.float32]
+    right: NDArray[np.float32]
+    scale: float
+    bias: float
+
+    def costs(self, disparity: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the log-odds of a mismatch in the cells of each pixel of a map.
+
+        Args:
+            disparity: (y + 100, x + 100) float32, px; NaN: none.
+
+        Returns:
+            (cell, y + 100, x + 100) float32, a cell for each of ``OFFSETS``; NaN where there is no disparity, where the
+            right pixel is outside the image, and in the outer 8 px.
+        """
+        made = np.full((len(OFFSETS), *disparity.shape), np.nan, np.float32)
+        inner = np.ascontiguousarray(disparity[REACH:-REACH, REACH:-REACH])
+        first = RADIUS - REACH
+        products = np.full((len(OFFSETS), *inner.shape), np.nan, np.float32)
+        _write_products(self.left, self.right, inner, OFFSETS[0], first, inner.shape[1] - first, products)
+        made[:, REACH:-REACH, REACH:-REACH] = np.float32(self.bias) - np.float32(self.scale) * products
+        return made
+
+
+@one_thread()
+def described(channels: NDArray[np.float32], descriptor_net: Network, precision: Precision) -> Described:
+    """Return the descriptors of both views.
+
+    Args:
+        channels: (view, channel, y + 100, x + 100) float32.
+        descriptor_net: ``parameters``.
+        precision: arithmetic of the convolutions; the products of descriptors are float32.
+
+    Raises:
+        StageError: if the channels do not fit the network.
+    """
+    net = descriptor_net_from_parameters(descriptor_net["parameters"], channels.shape[1])
+    with torch.inference_mode():
+        kernels = kernels_of(net, dtype_of(precision))
+        views = torch.from_numpy(np.ascontiguousarray(channels))
+        left, right = (transformed_descriptors(net, kernels, view).numpy() for view in views)
+        return Described(left, right, float(net.log_scale.exp()), float(net.bias))
+
+
+@kernel
+def _write_products(
+    left: NDArray[np.float32],
+    right: NDArray[np.float32],
+    disparity: NDArray[np.float32],
+    lowest: int,
+    first: int,
+    end: int,
+    made: NDArray[np.float32],
+) -> None:
+    """Write the dot product of the two descriptors of each cell."""
+    height, width = disparity.shape
+    for y in range(height):
+        for x in range(width):
+            if np.isnan(disparity[y, x]):
+                continue
+            base = int(np.floor(disparity[y, x])) + lowest
+            for cell in range(len(made)):
+                seen = x - base - cell
+                if first <= seen < end:
+                    total = np.float32(0)
+                    for k in range(left.shape[2]):
+                        total += left[y, x, k] * right[y, seen, k]
+                    made[cell, y, x] = total

@@ -1,0 +1,157 @@
+"""Declare what scores maps that another matcher made. Light: it does not load torch."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, NotRequired, TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from semidense.stages.compute.precision import Precision
+from semidense.stages.evaluation.declaration import RADIUS
+from semidense.stages.learning.schedule import SHARDS, Schedule
+from semidense.stages.stage import DisparityMap, Images, Network, Output, Params, Stage, Truth
+from semidense.stages.transforms.declaration import Channels
+
+MATCHERS = ("sgm", "sncc", "census", "mc_cnn")
+"""Other matchers whose maps are learnt from, by the names of their products."""
+KINDS = (
+    *(f"{matcher}, dense" for matcher in MATCHERS),
+    "sgm, checked",
+    "sgm, checked and filled",
+    "mc_cnn, checked",
+    "mc_cnn, checked and filled",
+    "summed costs",
+    "summed costs, whole disparities",
+    "summed costs, smoothed",
+    "summed costs, blurred",
+)
+"""The kinds of maps that are learnt from."""
+
+
+class ForeignSamplesParams(Params):
+    """Which pixels of which maps the net learns from."""
+
+    rows: int = Field(32, ge=1, description="rows of each map that are looked at, at a random height")
+    pixels: int = Field(1500, ge=1, description="pixels of each map, drawn at random from these rows")
+    precision: Precision = Field(
+        "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
+    )
+    seed: int = Field(0, ge=0, description="seed of the random draw")
+
+
+class ForeignNetParams(Schedule):
+    """How the net that scores foreign maps learns."""
+
+    steps: int = Field(3000, ge=1, description="optimiser steps")
+    optimiser: Literal["muon", "adam"] = Field("adam", description="what makes a step of a large kernel's gradient")
+    peak_rate: float = Field(0.01, gt=0, description="highest learning rate")
+    checkpoint_steps: int = Field(500, ge=1, description="steps between two checkpoints", exclude=True)
+    batch: int = Field(1024, ge=SHARDS, multiple_of=SHARDS, description="pixels a step; a multiple of the shards")
+    blind: float = Field(0.5, ge=0, le=1, description="share of the pixels that are seen without a right view")
+    tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
+    seed: int = Field(0, ge=0, description="seed of the weights and of the draw")
+
+
+class ForeignConfidenceParams(Params):
+    """What the confidence of a foreign map is made from."""
+
+    right: bool | None = Field(
+        None, description="let the costs of both views judge the map too; default: if the scene has a right view"
+    )
+    precision: Precision = Field(
+        "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
+    )
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The products that these settings need."""
+        judging = ("channels", "descriptor_net") if self.right else ()
+        return ("images", "disparity", "evaluation_net", "foreign_net", *judging)
+
+
+class ForeignSamples(TypedDict):
+    """The product ``foreign_samples``: (sample, feature) what is known; (sample,) error and kind of map."""
+
+    features: NDArray[np.float32]
+    error: NDArray[np.float32]
+    kind: NDArray[np.int8]
+
+
+class OfForeignSamples(TypedDict):
+    """The samples of every training scene."""
+
+    foreign_samples: Sequence[ForeignSamples]
+
+
+class Sampled(TypedDict):
+    """A training scene, the maps of all matchers, and the networks that say what is known of them."""
+
+    images: Images
+    truth: Truth
+    channels: Channels
+    sgm: Mapping[str, Any]
+    sncc: Mapping[str, Any]
+    census: Mapping[str, Any]
+    mc_cnn: Mapping[str, Any]
+    aggregated: DisparityMap
+    evaluation_net: Network
+    descriptor_net: Network
+
+
+class Foreign(TypedDict):
+    """What the confidence of a foreign map is made from; the last two only where the right view is looked at."""
+
+    images: Images
+    disparity: DisparityMap
+    evaluation_net: Network
+    foreign_net: Network
+    channels: NotRequired[Channels]
+    descriptor_net: NotRequired[Network]
+
+
+FOREIGN_SAMPLES = Stage(
+    product="foreign_samples",
+    inputs=("images", "truth", "channels", *MATCHERS, "aggregated", "evaluation_net", "descriptor_net"),
+    outputs=(
+        Output("features", ("sample", "feature"), "float32", "1", "what is known of each pixel"),
+        Output("error", ("sample",), "float32", "px", "difference of its disparity to the truth; infinite: none"),
+        Output("kind", ("sample",), "int8", "1", "kind of its map: index into " + "; ".join(KINDS)),
+    ),
+    compute="semidense.stages.evaluation.evidence.foreign.samples:draw_foreign_samples",
+    params=ForeignSamplesParams,
+)
+"""Pixels of the maps of several matchers, checked, filled, smoothed: what is learnt from. One a scene, so that a
+training that was stopped goes on with the scenes that are left."""
+
+FOREIGN_NET = Stage(
+    product="foreign_net",
+    inputs=("foreign_samples",),
+    outputs=(
+        Output("parameters", ("parameter",), "float32", "1", "weights of the net, and the scale of its inputs"),
+        Output("loss", ("step",), "float32", "1", "cross-entropy of each training step"),
+    ),
+    compute="semidense.stages.evaluation.evidence.foreign.train:train_foreign_net",
+    params=ForeignNetParams,
+    scope="split",
+    monitored=True,
+    learnt=True,
+)
+
+FOREIGN_CONFIDENCE = Stage(
+    product="foreign_confidence",
+    inputs=("images", "disparity", "evaluation_net", "foreign_net", "channels", "descriptor_net"),
+    outputs=(
+        Output("confidence", ("y", "x"), "float32", "1", "probability that the disparity is right, in [0, 1]"),
+        Output("network", ("y", "x"), "float32", "1", "probability by the evaluation-Net alone, in [0, 1]"),
+        Output("agreement", ("y", "x"), "float32", "1", "share of the window with the same disparity, in (0, 1]"),
+    ),
+    compute="semidense.stages.evaluation.evidence.foreign.confidence:compute_foreign_confidence",
+    params=ForeignConfidenceParams,
+    tile_rows=256,
+    halo=lambda _: RADIUS,
+    border="edge",
+    one_view=True,
+)
+"""The confidence of a map that another matcher made; ``use.confidence=foreign_confidence``. Only those inputs are made
+that the settings need."""
