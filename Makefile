@@ -58,10 +58,10 @@ train-general: $(READY)  ## DATA=DIR: train the preset robust on DIR/middlebury 
 			--upto $$product --output build/general/$$product || exit; \
 	done
 	for net in descriptor_net evidence_net evaluation_net; do \
-		cp build/general/$$net/$$net.safetensors stages/weights/$$net.general.safetensors; \
+		cp build/general/$$net/$$net.safetensors stages/weights/general/$$net.safetensors; \
 	done
 	cp build/general/calibration/calibration.safetensors \
-		stages/weights/calibration.general.evidence_confidence.aggregated.fast.safetensors
+		stages/weights/general/calibration.evidence_confidence.aggregated.fast.safetensors
 
 foreign: $(READY)  ## DATA=DIR: train what scores maps of other matchers, and put its weights in place
 	@test -n "$(DATA)" || { echo "make foreign: say where the Middlebury sets are: make foreign DATA=DIR"; exit 2; }

@@ -116,9 +116,9 @@ def weights_name(
     >>> weights_name("evaluation_net", "guided"), weights_name("matching_net", "guided")
     ('evaluation_net.guided', 'matching_net')
     >>> weights_name("descriptor_net", "fast", general=True)
-    'descriptor_net.general'
+    'general/descriptor_net'
     >>> weights_name("calibration", "fast", "evidence_confidence", "aggregated", general=True)
-    'calibration.general.evidence_confidence.aggregated.fast'
+    'general/calibration.evidence_confidence.aggregated.fast'
     """
     others = [name for name in (confidence, disparity, costvolume) if name not in _CALIBRATED]
     own = general and product in _GENERAL
@@ -126,7 +126,7 @@ def weights_name(
         kind = [*others, mode]
     else:
         kind = ["guided"] if mode == "guided" and product in _LEARNT_FROM_MAPS and not own else []
-    return ".".join([product, *(["general"] if own else []), *kind])
+    return ("general/" if own else "") + ".".join([product, *kind])
 
 
 def weights_file(name: str) -> Traversable:
@@ -163,7 +163,7 @@ def read_table(weights: Weights, _: Inputs) -> dict[str, Array]:
 
 def _missing(name: str) -> str:
     """Return what is missing and what to do about it."""
-    product, _, mode = name.partition(".")
+    product, _, mode = name.rpartition("/")[2].partition(".")
     if product != "calibration":
         return f"no weights for {name} come with this installation: train them with --train"
     if mode not in ("", "guided"):

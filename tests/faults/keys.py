@@ -83,7 +83,7 @@ def _settings(tally: Tally) -> None:
                     continue
                 tally.injected += 1
                 changed = {product for product in before.keys() & after.keys() if before[product] != after[product]}
-                reached = below(section) & set(before)  # not products that are made only when asked for
+                reached = _reached(section, name) & set(before)  # not products that are made only when asked for
                 expected = reached if _may_matter(section, name, value) else frozenset()
                 if changed != expected:
                     tally.fail("wrong", f"{section}.{name}={value} changes the keys of {sorted(changed ^ expected)}")
@@ -91,6 +91,13 @@ def _settings(tally: Tally) -> None:
             else:
                 if section not in ("training", *CHOICES):
                     tally.fail("wrong", f"{section}.{name}: no other valid value was found")
+
+
+def _reached(section: str, name: str) -> frozenset[str]:
+    """Return the products that may depend on a setting."""
+    if (section, name) == ("training", "cross_fit"):  # the first right map is then one by the networks of a fold
+        return below("evaluation_samples") | {"right_disparity"}
+    return below(section)
 
 
 def _may_matter(section: str, name: str, value: object) -> bool:
@@ -101,7 +108,7 @@ def _may_matter(section: str, name: str, value: object) -> bool:
         return resolve(str(value), transformed=transformed) != usual  # type: ignore[arg-type]
     if section == "costvolume" and name == "votes":
         return False  # of the guided volume only
-    return section in products() and name != "checkpoint_steps"
+    return (section in products() and name != "checkpoint_steps") or (section, name) == ("training", "cross_fit")
 
 
 def _others(field: Any, value: object) -> Iterator[object]:  # noqa: ANN401
