@@ -121,10 +121,11 @@ class Match:
 
     @cached_property
     def basis(self) -> Outcome | None:
-        """What the wanted error came to in training scenes; None if no error was asked for."""
-        if self.wishes.max_error is None:
+        """What the wanted error came to in training scenes; None without one, or if the confidence needs no table."""
+        found = self._find("calibration")
+        if self.wishes.max_error is None or found is None:
             return None
-        calibration = self.result.store.read(self.made("calibration").key)
+        calibration = self.result.store.read(found.key)
         return outcome(Table.of(calibration), calibration["log_odds"], self.wishes.max_error)
 
     @property
@@ -246,7 +247,7 @@ def wished(task: Task, wishes: Wishes) -> Task:
     """
     task = task.and_settings(wishes.settings)
     config = task.configuration()
-    if wishes.calibrated or wishes.max_error is not None:
+    if (wishes.calibrated or wishes.max_error is not None) and not config.choice("use", "calibrated_confidence"):
         weights_of(config, "calibration")
     return task
 

@@ -219,10 +219,10 @@ def _basis(match: Match) -> dict[str, Any]:
 
 def _calibration_notes(match: Match) -> list[str]:
     """Say so if the calibration was measured with other cost volumes than those of the match."""
-    if match.scene.has("disparity") or (not match.wishes.calibrated and match.wishes.max_error is None):
+    made = {each.step.product: each.step for each in match.result.made.values()}
+    if not {"costvolume", "calibration"} <= made.keys():
         return []
-    mode = match.made("costvolume").step.settings.get("mode")
-    shipped = getattr(match.made("calibration").step.argument, "name", "")
+    mode, shipped = made["costvolume"].settings.get("mode"), getattr(made["calibration"].argument, "name", "")
     if (mode, shipped) != ("fast", "calibration"):
         return []
     return ["the calibration was measured with exact cost volumes, and is used for these fast ones"]

@@ -26,10 +26,6 @@ class Score(Match):
     """
 
     @property
-    def basis(self) -> None:
-        """Nothing: the confidence is a probability by itself, and needs no table of training scenes."""
-
-    @property
     def disparities(self) -> DisparityRange:
         """The range of the map, or of its scene."""
         return self.scene.disparities
