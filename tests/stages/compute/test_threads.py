@@ -29,3 +29,25 @@ def test_a_thread_of_a_pool_keeps_one() -> None:
     thread.start()
     thread.join()
     assert found == [1]
+
+
+def test_a_thread_of_a_pool_keeps_one_when_another_thread_ends_its_call() -> None:
+    found, ready, ended = [], threading.Event(), threading.Event()
+
+    def work() -> None:
+        keep_one_thread()
+        ready.set()
+        ended.wait(60)
+        found.append(torch.get_num_threads())
+
+    before = torch.get_num_threads()
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        ready.wait(60)
+        torch.set_num_threads(3)  # as a call of one_thread does at its end
+        ended.set()
+        thread.join()
+    finally:
+        torch.set_num_threads(before)
+    assert found == [1]
