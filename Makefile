@@ -9,7 +9,7 @@ ifeq ($(filter exact guided,$(MODE)),)
 $(error MODE=$(MODE): the weights that come with the package are of exact and of guided volumes)
 endif
 
-.PHONY: demo test lint docs train descriptors evaluation evidence foreign calibration train-general bench faults silence wheel clean
+.PHONY: demo test names lint docs train descriptors evaluation evidence foreign calibration train-general bench faults silence wheel clean
 
 demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
 	$(BIN)/pipeline run motorcycle --output demo
@@ -17,15 +17,17 @@ demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
 test: $(READY)  ## run the tests, in two processes side by side
 	printf '%s\n' '$(APART)' 'tests $(APART:%=--ignore=%)' | xargs -P 2 -L 1 $(BIN)/python -m pytest
 
-lint: $(READY)  ## style, types, and who may import whom
-	mkdir -p build/names/semidense  # mypy does not follow the import hook of an editable install
+names: $(READY)  # what reads the sources does not follow the import hook of an editable install
+	mkdir -p build/names/semidense
 	for folder in pipeline stages datasets cache; do ln -sfn ../../../$$folder build/names/semidense/$$folder; done
+
+lint: names  ## style, types, and who may import whom
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-docs: $(READY)  ## build the documentation site into build/site; a link that leads nowhere is an error
+docs: names  ## build the documentation site into build/site; a link that leads nowhere is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 train: $(READY)  ## DATA=DIR: train both networks on DIR/2001, 2003, 2005 and 2006, and put the weights in place
