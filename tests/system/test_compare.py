@@ -118,7 +118,7 @@ def test_the_report_shows_what_is_cached_and_says_the_same(found: Comparison, ta
             assert row["method"] in page and f'<td class="number">{row["auc"]:.4f}</td>' in page
         if row["experiment"] == "density" and "R" not in row:
             assert f'<td class="number">{row["invalid"]:.2f}</td>' in page, "the table"
-            assert ("bad" in row) == (f">{row['method']}</text>" in page), "the curve's legend"
+            assert ("bad" in row) == (f">{row['method']} (other matcher)</text>" in page), "the curve's legend"
 
 
 def test_the_report_makes_nothing_and_leaves_out_other_settings(task: Task, tmp_path: Path) -> None:

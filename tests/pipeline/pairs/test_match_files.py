@@ -15,11 +15,11 @@ OWN = Weights("calibration", "", Path("mine.safetensors"), "cd")
 
 
 def match(mode: str, weights: Weights, wishes: Wishes) -> Any:  # noqa: ANN401
-    steps = {
-        "costvolume": SimpleNamespace(settings={"mode": mode}),
-        "calibration": SimpleNamespace(argument=weights),
-    }
-    return SimpleNamespace(wishes=wishes, made=lambda product: SimpleNamespace(step=steps[product]))
+    steps = [SimpleNamespace(product="costvolume", settings={"mode": mode}, argument=None)]
+    if wishes.calibrated or wishes.max_error is not None:
+        steps.append(SimpleNamespace(product="calibration", settings={}, argument=weights))
+    made = {step.product: SimpleNamespace(step=step) for step in steps}
+    return SimpleNamespace(wishes=wishes, result=SimpleNamespace(made=made))
 
 
 @pytest.mark.parametrize(
