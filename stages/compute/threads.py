@@ -9,8 +9,8 @@ import torch
 def keep_one_thread() -> None:
     """Make torch use one thread an operation in the calling thread from now on: for threads of a pool of ours.
 
-    A new thread takes over the number of the process when torch first looks at it, whatever was set in the thread before.
-    So this look comes first: another thread that ends ``one_thread`` may have set the number of the process meanwhile.
+    A new thread takes over the number of the process when torch first looks at it, whatever was set in the thread
+    before. So this look comes first: another thread that ends ``one_thread`` may set the number of the process later.
     """
     torch.get_num_threads()
     torch.set_num_threads(1)
