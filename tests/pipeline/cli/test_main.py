@@ -185,7 +185,7 @@ def test_cache_ls_lists_every_entry(invoke: Invoke, trained: Result) -> None:
     assert len(lines) == 2 + len(list(trained.store.entries())), "a header, a line each, and how many there are"
     entries = only_object(invoke("cache", "ls", "--cache", root, "--json").out)["entries"]
     assert set(entries[0]) == {
-        *("product", "dataset", "scene", "key", "digest", "created", "seconds", "size", "last_used", "settings")
+        *("product", "dataset", "scene", "key", "digest", "created", "seconds", "bytes", "last_used", "settings")
     }
 
 

@@ -92,7 +92,13 @@ def clean(folder: Path | None, wish: Wish, *, yes: bool, as_json: bool) -> None:
     deleted = collect(store, found.items) if yes and found.items else ()
     if as_json:
         rows = [
-            {"kind": item.kind, "name": item.name, "reason": item.reason, "size": item.size, "deleted": item in deleted}
+            {
+                "kind": item.kind,
+                "name": item.name,
+                "reason": item.reason,
+                "bytes": item.size,
+                "deleted": item in deleted,
+            }
             for item in found.items
         ]
         print_json({"items": rows, "kept": found.kept, "kept_bytes": found.kept_bytes, "in_use": found.used})

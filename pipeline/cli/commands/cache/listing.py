@@ -78,10 +78,10 @@ def list_entries(folder: Path | None, selection: Selection, as_json: bool) -> No
     store = open_store(folder)
     entries, settings, used = selection.of(store), Settings(store.entries()), store.last_used()
     if as_json:
-        names = ("key", "digest", "created", "seconds", "size")
+        names = ("key", "digest", "created", "seconds")
         rows = [
-            {**entry.label, **{name: getattr(entry, name) for name in names}, "last_used": _time(used(entry.key))}
-            | {"settings": settings.text(entry)}
+            {**entry.label, **{name: getattr(entry, name) for name in names}, "bytes": entry.size}
+            | {"last_used": _time(used(entry.key)), "settings": settings.text(entry)}
             for entry in entries
         ]
         print_json({"entries": rows})

@@ -27,7 +27,7 @@ def export_archive(folder: Path | None, selection: Selection, target: Path, *, i
     entries = export_entries(store, keys, target)
     size = sum(entry.size for entry in entries)
     if as_json:
-        print_json({"archive": str(target), "entries": [entry.key for entry in entries], "size": size})
+        print_json({"archive": str(target), "entries": [entry.key for entry in entries], "bytes": size})
     else:
         results().print(f"wrote {len(entries)} entries, {bytes_text(size)}, to {target}", markup=False)
 
