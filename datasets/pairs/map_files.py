@@ -201,6 +201,8 @@ def _require_possible(what: str, values: DisparityMap) -> None:
     known = values[np.isfinite(values)]
     if not known.size:
         raise DatasetError(f"{what}: no pixel has a disparity")
+    if not known.any():
+        raise DatasetError(f"{what}: all disparities are 0, as in a map that nobody filled")
     if np.abs(known).max() >= values.shape[1]:
         raise DatasetError(
             f"{what}: a disparity of {np.abs(known).max():.6g} px in an image of {values.shape[1]} px; give the stored "

@@ -95,6 +95,7 @@ def test_zero_and_negative_disparities_are_kept(tmp_path: Path) -> None:
             "a.png", np.full((4, 120), 600, np.uint16), Reading(), r"scale=256.*scale=16.*give one", id="16 or 256"
         ),
         pytest.param("a.npy", np.full((4, 9), N), Reading(), "no pixel has a disparity", id="nothing known"),
+        pytest.param("a.npy", np.zeros((4, 9), np.float32), Reading(), "all disparities are 0", id="never filled"),
         pytest.param("a.npy", as_none(1e6), Reading(), "1e.06 px in an image of 120 px.*none=", id="large none"),
         pytest.param("a.npy", np.zeros((4, 9, 3)), Reading(), r"\(rows, columns\) of numbers", id="three bands"),
         pytest.param("a.npy", np.zeros((4, 9), bool), Reading(), r"\(rows, columns\) of numbers", id="a mask"),
