@@ -89,7 +89,7 @@ def require_texts(name: str, value: object) -> None:
     Raises:
         InvalidRecipe: naming what it is.
     """
-    if not isinstance(value, Mapping) or any(type(part) is not str for pair in value.items() for part in pair):
+    if not isinstance(value, Mapping) or {*map(type, value), *map(type, value.values())} - {str}:
         raise InvalidRecipe(f"{name} must map text to text, not {value!r}")
 
 

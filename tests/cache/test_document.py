@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semidense.cache.document import canonical, digest, laid_out, parse, seal, unseal
+from semidense.cache import document
+from semidense.cache.document import canonical, digest, laid_out, parse, plain, seal, unseal
 from semidense.cache.errors import InvalidRecipe
 
 scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text()
@@ -132,4 +133,20 @@ def test_digest_is_the_sha256_of_the_text() -> None:
 @settings(max_examples=100, deadline=None)
 @given(trees)
 def test_documents_are_laid_out_as_the_standard_library_does(value: object) -> None:
-    assert laid_out(canonical(value)) == json.dumps(value, sort_keys=True, indent=1)
+    assert laid_out(plain(value)) == json.dumps(value, sort_keys=True, indent=1)
+
+
+def test_a_document_of_many_texts_costs_few_calls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A plan reads thousands of records, each with hundreds of hashes: no function may be called for each of them."""
+    calls: list[str] = []
+
+    def count(name: str) -> None:
+        function = getattr(document, name)
+        monkeypatch.setattr(document, name, lambda *given: calls.append(name) or function(*given))
+
+    data = seal("thing", {"code": {f"module{number}": "0" * 64 for number in range(1000)}, "more": [{"a": [1, 2]}]})
+    count("plain")
+    count("laid_out")
+    unseal("thing", data)
+    assert {*calls} == {"plain", "laid_out"}
+    assert len(calls) < 30
