@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from semidense.stages.learning.scenes import Scenes
 from semidense.stages.matching.declaration import MatchingSamples, MatchingSamplesParams, OfTruths
 from semidense.stages.stage import StageError, Truth, by_scene
 
@@ -55,8 +56,12 @@ def draw_samples(params: MatchingSamplesParams, inputs: OfTruths) -> MatchingSam
         StageError: if a crop does not fit into a scene, or a scene has no pixel to learn from.
     """
     rng = np.random.default_rng(params.seed)
-    scenes = [_Scene(truth, params) for truth in by_scene(inputs["truth"], "truth")]
-    order = rng.permutation(_scene_of_sample(params, [scene.truth for scene in scenes]))
+    truths = by_scene(inputs["truth"], "truth")
+    sides = Scenes(
+        lambda side: _Side.of(visible_truth(truths[side // 2], bool(side % 2)), params.crop), 2 * len(truths)
+    )
+    scenes = [_Scene(truth, params, sides, number) for number, truth in enumerate(truths)]
+    order = rng.permutation(_scene_of_sample(params, truths))
     drawn = [_draw(scenes[scene], rng) for scene in order]
     return {
         "scene": order.astype(np.int32),
@@ -84,7 +89,7 @@ def _scene_of_sample(params: MatchingSamplesParams, truths: Sequence[Truth]) -> 
 
 @dataclass(frozen=True)
 class _Side:
-    """What can be learnt from one orientation of a scene: looked for once, not for each sample."""
+    """What can be learnt from one orientation of a scene: looked for once, not for each sample, while there is room."""
 
     visible: NDArray[np.float32]  # y x, px
     candidates: NDArray[np.int32]  # flat indices of the pixels of known truth
@@ -103,6 +108,11 @@ class _Side:
             raise StageError(f"a crop of {crop} px does not fit into a training scene of {visible.shape} px")
         return cls(visible, candidates)
 
+    @property
+    def nbytes(self) -> int:
+        """What keeping it takes."""
+        return self.visible.nbytes + self.candidates.nbytes
+
     def corner(self, crop: tuple[int, int], rng: np.random.Generator) -> tuple[int, int]:
         """Return the corner of a crop that holds a random pixel of known truth, at a random place in the crop."""
         shape = np.array(self.visible.shape)
@@ -113,10 +123,19 @@ class _Side:
 
 @dataclass(frozen=True)
 class _Scene:
-    """A training scene, upright and, where samples may be mirrored, mirrored."""
+    """A training scene, upright and, where samples may be mirrored, mirrored.
+
+    Attributes:
+        truth: its arrays, which may be read whenever they are asked for.
+        params: of the product.
+        sides: of all scenes, two each: upright, then mirrored.
+        number: of the scene.
+    """
 
     truth: Truth
     params: MatchingSamplesParams
+    sides: Scenes[_Side]
+    number: int
 
     @cached_property
     def range(self) -> tuple[int, int]:
@@ -125,19 +144,14 @@ class _Scene:
         return int(low), int(high)
 
     @cached_property
-    def upright(self) -> _Side:
-        return _Side.of(visible_truth(self.truth, mirrored=False), self.params.crop)
+    def may_be_mirrored(self) -> bool:
+        """False where the right view has no truth, or samples are not to be mirrored."""
+        return self.params.mirror and bool(np.any(self.truth["right_nonocc"]))
 
-    @cached_property
-    def mirrored(self) -> _Side | None:
-        """None where the right view has no truth, or samples are not to be mirrored."""
-        if not (self.params.mirror and np.any(self.truth["right_nonocc"])):
-            return None
-        return _Side.of(visible_truth(self.truth, mirrored=True), self.params.crop)
-
-    def side(self, rng: np.random.Generator) -> _Side:
-        """Return one of the sides there are, each as likely as the other."""
-        return self.upright if self.mirrored is None or rng.random() >= 0.5 else self.mirrored
+    def draw_side(self, rng: np.random.Generator) -> tuple[bool, _Side]:
+        """Return one of the sides there are, each as likely as the other, and whether it is the mirrored one."""
+        mirrored = self.may_be_mirrored and bool(rng.random() < 0.5)
+        return mirrored, self.sides[2 * self.number + mirrored]
 
 
 class _Drawn(NamedTuple):
@@ -153,14 +167,14 @@ class _Drawn(NamedTuple):
 def _draw(scene: _Scene, rng: np.random.Generator) -> _Drawn:
     """Draw one sample of one scene, around a pixel whose truth is known."""
     params = scene.params
-    side = scene.side(rng)
+    mirrored, side = scene.draw_side(rng)
     y, x = side.corner(params.crop, rng)
     crop = side.visible[y : y + params.crop[0], x : x + params.crop[1]]
     known = crop[np.isfinite(crop)]
     pick = _patch_slots if params.form == "patch" else _dense_slots
     slots = pick(known, *scene.range, params.disparities, rng)
     truth = np.ascontiguousarray(crop, np.float32)
-    return _Drawn(side is scene.mirrored, y, x, slots.astype(np.int32), truth)
+    return _Drawn(mirrored, y, x, slots.astype(np.int32), truth)
 
 
 def _patch_slots(

@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 
+from semidense.stages.learning import scenes as kept
+from semidense.stages.matching import samples
 from semidense.stages.matching.crops import IGNORED, cut_crop, label_cells
 from semidense.stages.matching.declaration import MATCHING_SAMPLES, MatchingSamplesParams
 from semidense.stages.matching.samples import ABSENT, draw_samples, visible_truth
@@ -53,6 +55,19 @@ def test_a_seed_gives_one_draw_and_another_seed_another(form: str) -> None:
     one, again, other = (draw_samples(MatchingSamplesParams(form=form, seed=s, **SMALL), truths()) for s in (1, 1, 2))
     assert same(one, again)
     assert not same(one, other)
+
+
+def test_scenes_that_do_not_fit_into_memory_give_the_same_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[bool] = []
+    monkeypatch.setattr(
+        samples, "visible_truth", lambda truth, mirrored: asked.append(mirrored) or visible_truth(truth, mirrored)
+    )
+    scenes = truths(shifted_scene(), without_right(shifted_scene()), shifted_scene())
+    all_kept = draw_samples(MatchingSamplesParams(**SMALL), scenes)
+    assert sorted(asked) == [False, False, False, True, True]  # each side there is, once
+    monkeypatch.setattr(kept, "MOST_BYTES", 0)
+    assert same(draw_samples(MatchingSamplesParams(**SMALL), scenes), all_kept)
+    assert len(asked) > 20  # only the side that was drawn from last stays in memory
 
 
 def test_a_share_of_the_samples_is_of_dense_truths() -> None:
