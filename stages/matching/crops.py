@@ -21,7 +21,7 @@ from semidense.stages.matching.declaration import RADIUS, MatchingSamples
 from semidense.stages.matching.samples import ABSENT
 
 IGNORED = -1
-Channels = Sequence[NDArray[np.float32]] | Scenes
+Channels = Sequence[NDArray[np.float32]] | Scenes[NDArray[np.float32]]
 """The channels of each training scene: float32 (view, channel, y, x)."""
 
 
