@@ -13,7 +13,7 @@ from semidense.cache.keys.recipe import short
 from semidense.pipeline.execution.scheduler import totals
 from semidense.pipeline.plan.causes import PENDING
 from semidense.pipeline.plan.plan import Made, Plan, Planned
-from semidense.pipeline.results.estimate import Estimate, estimate
+from semidense.pipeline.results.estimate import Estimate, Part, estimate, estimate_parts, in_all
 from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, averaged, with_means
 from semidense.pipeline.results.text import print_table, results
 from semidense.stages.metrics.stage import ROW
@@ -53,16 +53,44 @@ def _change_row(change: Change) -> dict[str, Any]:
     return {"field": change.field, "old": change.old, "new": change.new}
 
 
-def show_plan(plan: Plan, store: Store, as_json: bool) -> None:
-    """Print a plan and how long it will take, as a table or as JSON."""
-    time = estimate(plan, store)
+def show_plan(plan: Plan, store: Store, as_json: bool, workers: int | None = None) -> None:
+    """Print a plan and how long it will take, as a table or as JSON.
+
+    Args:
+        plan: what would be reused and made.
+        store: the cache.
+        as_json: print one JSON object.
+        workers: also print what each product takes on so many workers.
+    """
+    parts = estimate_parts(plan, store)
     if as_json:
-        print_json({"steps": step_rows(plan, {}), "metrics": [], "estimate_seconds": time.seconds})
+        own = {"workers": workers, "stages": [part_row(part, workers) for part in parts]} if workers else {}
+        print_json({"steps": step_rows(plan, {}), "metrics": [], "estimate_seconds": in_all(parts).seconds, **own})
     else:
-        print_plan(plan, time)
+        print_plan(plan, in_all(parts, workers), parts if workers else (), workers or 1)
 
 
-def print_plan(plan: Plan, time: Estimate) -> None:
+def part_row(part: Part, workers: int) -> dict[str, Any]:
+    """Return the row that ``run --dry-run --json`` promises for each product that is to be made."""
+    seconds = part.seconds_on(workers)
+    hours = None if seconds is None else seconds / 3600
+    return {"product": part.product, "results": part.results, "tasks": part.tasks, "bytes": part.bytes, "hours": hours}
+
+
+def _print_parts(parts: Sequence[Part], workers: int, console: Console) -> None:
+    """Print a line a product: how many tasks and bytes, and how long they take."""
+    heads = ("tasks", "MB", f"min on {workers} worker{'s' if workers > 1 else ''}")
+    table = Table("product", *heads, box=None, pad_edge=False)
+    for column in table.columns[1:]:
+        column.justify = "right"
+    for part in parts:
+        seconds = part.seconds_on(workers)
+        size = "unknown" if part.bytes is None else f"{part.bytes / 1e6:,.1f}"
+        table.add_row(part.product, f"{part.tasks:,}", size, "unknown" if seconds is None else f"{seconds / 60:,.2f}")
+    console.print(table)
+
+
+def print_plan(plan: Plan, time: Estimate, parts: Sequence[Part] = (), workers: int = 1) -> None:
     """Print a line a product and scene: its state, its key, and why it is not a hit; then how long a run takes."""
     table = Table("product", "scene", "state", "key", "why", box=None, pad_edge=False)
     tellers: dict[str, str] = {}
@@ -73,6 +101,8 @@ def print_plan(plan: Plan, time: Estimate) -> None:
     console = results()
     console.print(table)
     print_notes(plan.notes)
+    if parts:
+        _print_parts(parts, workers, console)
     todo: dict[str, int] = {}
     for planned in plan.todo():
         todo[planned.step.product] = todo.get(planned.step.product, 0) + 1
@@ -80,7 +110,8 @@ def print_plan(plan: Plan, time: Estimate) -> None:
     making = ", ".join(f"{count} {product}" for product, count in todo.items()) or "nothing"
     console.print(f"reuses {hits} products, makes {making}", highlight=False)
     if todo:
-        console.print(f"time: {time}", highlight=False)
+        where = f" on {workers} worker{'s' if workers > 1 else ''}" if parts and time.seconds is not None else ""
+        console.print(f"time: {time}{where}", highlight=False)
 
 
 LONG = 10.0

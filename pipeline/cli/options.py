@@ -83,7 +83,8 @@ ForceOption = Annotated[
     ),
 ]
 DryRunOption = Annotated[
-    bool, typer.Option("--dry-run", help="Print what would be reused and what would be made, and make nothing.")
+    bool,
+    typer.Option("--dry-run", help="Print what would be reused, and what would be made in what time; make nothing."),
 ]
 FormatOption = Annotated[str, typer.Option("--format", help="Formats of the maps, with commas.")]
 ProductArgument = Annotated[str, typer.Argument(help="A product, such as costvolume, disparity or confidence.")]

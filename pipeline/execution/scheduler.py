@@ -12,6 +12,7 @@ from uuid import uuid4
 from semidense.cache import CacheUnavailable, Lease, Store
 from semidense.pipeline.execution import tasks
 from semidense.pipeline.execution.claims import Claims, LocalClaims
+from semidense.pipeline.execution.cluster.deployment import count_threads
 from semidense.pipeline.execution.cluster.proof import runner_code
 from semidense.pipeline.execution.cluster.running import SETTLE_SECONDS, Tasks, run_on_cluster
 from semidense.pipeline.execution.jobs import Context
@@ -55,8 +56,17 @@ def execute(
             code = {name: each for planned in plan.todo() for name, each in planned.step.code.items()}
             needed = {**code, **(context.runner or {})}
             return run_on_cluster(lambda: _graph(plan, context), needed, store, held, watch, scheduler)
-        threads = workers or os.cpu_count() or 1
+        threads = threads_of(None, workers)
         return _on_threads(plan, Context(store, watch, extras, LocalClaims(held, store, threads)), threads)
+
+
+def threads_of(scheduler: str | None, workers: int | None) -> int:
+    """Return how many tasks a run carries out at a time, given what ``execute`` is given.
+
+    Raises:
+        UsageError: if no scheduler answers.
+    """
+    return count_threads(scheduler) if scheduler else workers or os.cpu_count() or 1
 
 
 def _there(planned: Planned) -> Made:
@@ -137,7 +147,7 @@ def _add_step(graph: dict[str, Any], step: Step, plan: Plan, shared: Any, result
     add = partial(_add_task, graph, step.product)
     inputs = List(*(results[each] for each in dict.fromkeys(each for ids in step.inputs.values() for each in ids)))
     own, forced = _add_value(graph, step.product, step), step.product in plan.forced
-    job = add(tasks.begin, shared, own, inputs, forced, tasks.len_tiles(step))
+    job = add(tasks.begin, shared, own, inputs, forced, step.tiles)
     if step.stage.tile_rows is None or step.size is None:
         parts = [add(tasks.make_whole, shared, job)]
     else:

@@ -92,7 +92,7 @@ def make_tile(context: Context, job: Job, rows: Rows) -> Span | None:
         made = _compute_tile(context, job, rows)
         for output in step.stage.outputs:
             _write_tile(job.draft, output, made[output.name], rows)
-    context.watch.advanced(step, 1, len_tiles(step), "")
+    context.watch.advanced(step, 1, step.tiles, "")
     return begun, time.time()
 
 
@@ -122,13 +122,6 @@ def _call(step: Step, *arguments: object) -> Arrays:
 def _holds_tile(draft: Draft, outputs: Iterable[Output], rows: Rows) -> bool:
     """Return whether another worker wrote this tile."""
     return all(draft.holds(output.name, _region(output, rows)) for output in outputs if _has_part(output, rows))
-
-
-def len_tiles(step: Step) -> int:
-    """Return how many tiles a step is made in."""
-    if step.stage.tile_rows is None or step.size is None:
-        return 1
-    return -(-step.size[0] // step.stage.tile_rows)
 
 
 def create_arrays(job: Job) -> Job:

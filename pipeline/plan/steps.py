@@ -6,7 +6,10 @@ share the steps in which they agree, so a sweep computes nothing twice. Nothing 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import prod
 from typing import Any
+
+import numpy as np
 
 from semidense.cache import Recipe, code_parts
 from semidense.datasets import Dataset, SceneSource
@@ -89,6 +92,23 @@ class Step:
     def name(self) -> str:
         """Product and scene, for messages."""
         return f"{self.product} of {self.scene}"
+
+    @property
+    def tiles(self) -> int:
+        """How many tasks make it: one a tile."""
+        if self.stage.tile_rows is None or self.size is None:
+            return 1
+        return -(-self.size[0] // self.stage.tile_rows)
+
+    @property
+    def declared_bytes(self) -> int | None:
+        """Bytes of its arrays before compression; None where a length or a type is known only once it is made."""
+        if self.size is None:
+            return None
+        sizes = {"y": self.size[0], "x": self.size[1], **self.stage.sizes(self.params)}
+        if any(each.dtype is None or not {*each.dims} <= {*sizes} for each in self.stage.outputs):
+            return None
+        return sum(prod(sizes[dim] for dim in each.dims) * np.dtype(each.dtype).itemsize for each in self.stage.outputs)
 
     def recipe(self, digests: Mapping[str, str]) -> Recipe:
         """Return the recipe, given the output digest of each input step by its id."""

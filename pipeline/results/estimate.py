@@ -1,9 +1,10 @@
-"""Estimate how long a plan will take, from how long this machine took for results in the cache."""
+"""Estimate how long a plan will take and how much it will write, from results in the cache that this machine made."""
 
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
-from typing import Any
+from typing import Any, TypeVar
 
 from semidense.cache import Entry, Store
 from semidense.cache.document import canonical
@@ -14,6 +15,7 @@ from semidense.pipeline.plan.steps import Step
 from semidense.stages.catalog import READ
 
 _RANGE = ("d_min", "d_max")
+T = TypeVar("T", int, float)
 
 
 @dataclass(frozen=True)
@@ -57,20 +59,77 @@ def duration(seconds: float) -> str:
     return f"about {seconds / 3600:.1f} h"
 
 
-def estimate(plan: Plan, store: Store) -> Estimate:
-    """Return how long the products of a plan that are not cached will take.
+@dataclass(frozen=True)
+class Part:
+    """All that is to be made of one product.
+
+    Attributes:
+        product: its name.
+        results: how many are to be made, such as one a scene.
+        tasks: which workers carry out at the same time: one a tile.
+        bytes: of its arrays before compression; where that is not known beforehand, of the files of results like
+            it; None if there are none either.
+        seconds: on this machine, one result after the other; None if one of them is unknown.
+        work: the same on one thread, where each tile of a result takes as long as the others.
+        longest: seconds of the longest task on one thread.
+    """
+
+    product: str
+    results: int
+    tasks: int
+    bytes: int | None
+    seconds: float | None
+    work: float
+    longest: float
+
+    def seconds_on(self, workers: int) -> float | None:
+        """Return the time on so many workers of one thread each, as fast as one of this machine; None if unknown."""
+        return None if self.seconds is None else max(self.work / workers, self.longest)
+
+
+def estimate_parts(plan: Plan, store: Store) -> tuple[Part, ...]:
+    """Return what the products of a plan that are not cached will take, product by product in the order of the plan.
 
     A product of a scene takes the time of a cached one of the same product and mode, times the ratio of pixels x
     disparities. A product of the training split takes the time of one with equal settings. Reading files is not
     counted. What other products make at the same time is not subtracted.
     """
-    todo = [planned.step for planned in plan.todo() if planned.step.product not in READ]
-    if not todo:
-        return Estimate()
+    if not plan.todo():
+        return ()
     measured, disparities = _Measured(store.entries()), _planned_disparities(plan)
-    times = [(step.product, measured.seconds(step, disparities[step.id])) for step in todo]
-    unknown = dict.fromkeys(product for product, seconds in times if seconds is None)
-    return Estimate(sum(seconds or 0.0 for _, seconds in times), tuple(unknown))
+    steps: dict[str, list[Step]] = {}
+    for step in (planned.step for planned in plan.todo()):
+        steps.setdefault(step.product, []).append(step)
+    return tuple(_part(each, measured, disparities) for each in steps.values())
+
+
+def _part(steps: Sequence[Step], measured: "_Measured", disparities: Mapping[str, int]) -> Part:
+    """Return what the steps of one product take."""
+    tiles = [step.tiles for step in steps]
+    times = [0.0 if each.product in READ else measured.seconds(each, disparities[each.id]) for each in steps]
+    sizes = [measured.bytes(step) for step in steps]
+    # A measured time is of as many of this machine's threads as the result has tiles for.
+    work = [(time or 0.0) * min(os.cpu_count() or 1, count) for time, count in zip(times, tiles, strict=True)]
+    longest = max(each / count for each, count in zip(work, tiles, strict=True))
+    return Part(steps[0].product, len(steps), sum(tiles), _sum(sizes), _sum(times), sum(work), longest)
+
+
+def _sum(values: Sequence[T | None]) -> T | None:
+    """Return the sum; None if a value is unknown."""
+    known = [value for value in values if value is not None]
+    return sum(known[1:], known[0]) if len(known) == len(values) else None
+
+
+def in_all(parts: Iterable[Part], workers: int | None = None) -> Estimate:
+    """Return the time of all parts, one after the other: on so many workers, or None: as this machine measured."""
+    times = [(each.product, each.seconds_on(workers) if workers else each.seconds) for each in parts]
+    unknown = tuple(product for product, seconds in times if seconds is None)
+    return Estimate(sum(seconds or 0.0 for _, seconds in times), unknown)
+
+
+def estimate(plan: Plan, store: Store) -> Estimate:
+    """Return how long the products of a plan that are not cached will take on this machine."""
+    return in_all(estimate_parts(plan, store))
 
 
 class _Measured:
@@ -93,6 +152,11 @@ class _Measured:
         if step.size is None:
             return nearest.seconds
         return nearest.seconds * prod(step.size) * disparities / (_pixels(nearest) * self._searched(nearest))
+
+    def bytes(self, step: Step) -> int | None:
+        """Return how many bytes a step's arrays will have, see ``Part``."""
+        nearest = self._nearest_to(step) if step.declared_bytes is None else None
+        return nearest.size if nearest else step.declared_bytes
 
     def _nearest_to(self, step: Step) -> Entry | None:
         """Return the entry nearest to a step; looked for once for all scenes, which differ in their range alone."""

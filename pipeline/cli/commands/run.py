@@ -63,10 +63,12 @@ def run(
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
+    from semidense.pipeline.execution.scheduler import threads_of
 
     task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     if dry_run:
-        return console.show_plan(api.status(task, upto, forced=force or ()), api.open_store(cache), as_json)
+        plan = api.status(task, upto, forced=force or ())
+        return console.show_plan(plan, api.open_store(cache), as_json, threads_of(scheduler, workers))
     with ProgressWatch(console.announce, verbose - quiet) as watch:
         result = api.run(task, upto, forced=force or (), watch=watch, scheduler=scheduler, workers=workers)
     files = _export(result, output)
@@ -112,12 +114,14 @@ def sweep(
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
+    from semidense.pipeline.execution.scheduler import threads_of
     from semidense.pipeline.files.run_files import write_sweep
 
     task = _task(dataset, scene, chosen(None, mode), config, train, cache, preset)
     if dry_run:
         request = api.sweep_request(task, thresholds, settings or ())
-        return console.show_plan(api.planned(task, request), api.open_store(cache), as_json)
+        plan = api.planned(task, request)
+        return console.show_plan(plan, api.open_store(cache), as_json, threads_of(scheduler, workers))
     with ProgressWatch(console.announce, verbose - quiet) as watch:
         result = api.sweep(task, thresholds, settings or (), watch=watch, scheduler=scheduler, workers=workers)
     files = write_sweep(result.metrics, output)

@@ -46,6 +46,18 @@ def connected(scheduler: str) -> Iterator[Any]:
                 client.close(timeout=2)
 
 
+def count_threads(scheduler: str) -> int:
+    """Return how many tasks the workers of a scheduler do at a time, at least 1; no worker is started for it.
+
+    Raises:
+        UsageError: as ``connected`` does.
+    """
+    if match := _PROCESSES.fullmatch(scheduler):
+        return max(1, int(match[1]))
+    with connected(scheduler) as client:
+        return max(1, sum(client.nthreads().values()))
+
+
 def _where(scheduler: str, stack: ExitStack) -> dict[str, str]:
     """Return what tells Dask's client where the scheduler is, after starting one if that is asked for."""
     if match := _PROCESSES.fullmatch(scheduler):

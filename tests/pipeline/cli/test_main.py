@@ -1,6 +1,7 @@
 """Every command through the entry point, on the cache of one tiny run."""
 
 import json
+from collections import Counter
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -92,8 +93,15 @@ def test_a_plan_is_printed_and_nothing_made(invoke: Invoke, there: list[str], ho
     assert lines[-2][:3] == ["reuses", "8", "products,"]
     assert lines[-1][0] == "time:"
     found = only_object(invoke(*how, *there, "--set", "channels.rank_window=15", "--json").out)
-    assert set(found) == {"steps", "metrics", "estimate_seconds"}
+    assert set(found) == {
+        "steps",
+        "metrics",
+        "estimate_seconds",
+        *(["workers", "stages"] if "--dry-run" in how else []),
+    }
     assert [list(row) for row in found["steps"]] == [STEP_KEYS] * 27
+    states = Counter(row["product"] for row in found["steps"] if row["state"] != "hit")
+    assert {row["product"]: row["results"] for row in found.get("stages", ())} in ({}, states)
     assert {path.stat().st_mtime_ns for path in trained.store.root.rglob("*")} == before
 
 

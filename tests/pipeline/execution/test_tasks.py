@@ -96,11 +96,11 @@ def test_arrays_have_dims_units_and_a_line_for_people(context: Context) -> None:
 
 @pytest.mark.parametrize(("tile_rows", "count"), [(None, 1), (4, 3), (5, 2), (10, 1), (64, 1)])
 def test_tiles_are_counted_as_they_are_cut(tile_rows: int | None, count: int) -> None:
-    assert tasks.len_tiles(step(replace(BLURRED, tile_rows=tile_rows))) == count
+    assert step(replace(BLURRED, tile_rows=tile_rows)).tiles == count
 
 
 def test_a_step_of_the_split_is_one_tile() -> None:
-    assert tasks.len_tiles(replace(step(BLURRED), size=None)) == 1
+    assert replace(step(BLURRED), size=None).tiles == 1
 
 
 def test_a_dtype_is_stored_as_declared_or_else_as_computed(context: Context) -> None:

@@ -11,7 +11,8 @@ from semidense.pipeline.plan.environment import cpu_name
 from semidense.pipeline.plan.plan import Plan, Planned
 from semidense.pipeline.plan.steps import Step
 from semidense.pipeline.results import estimate as estimates
-from semidense.pipeline.results.estimate import Estimate, estimate
+from semidense.pipeline.results.estimate import Estimate, Part, estimate, estimate_parts, in_all
+from semidense.stages.stage import Output
 from tests.pipeline.toy import BLURRED, SUM, step
 
 SIZE = (10, 4)
@@ -96,6 +97,33 @@ def test_the_nearest_settings_count_and_of_equals_the_newest(store: Store, remem
     remember("blurred", 8.0, mode="exact", d_min=1, d_max=10, window=11)
     remember("blurred", 50.0, mode="exact", d_min=0, d_max=9, window=31)
     assert estimate(plan(COSTS), store).seconds == 8.0
+
+
+def test_parts_by_hand(store: Store, remember: Remember, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two scenes of 10 x 4 px in tiles of 4 rows: 3 tiles each; a result took 6 s on the two threads here."""
+    monkeypatch.setattr(estimates.os, "cpu_count", lambda: 2)
+    remember("blurred", 6.0, mode="exact", d_min=0, d_max=9, window=11)
+    tiled = replace(COSTS, stage=replace(COSTS.stage, tile_rows=4))
+    (part,) = estimate_parts(plan(tiled, replace(tiled, id="other scene")), store)
+    assert part == Part("blurred", 2, 6, part.bytes, 12.0, 24.0, 4.0)
+    assert [part.seconds_on(workers) for workers in (1, 2, 4, 100)] == [24.0, 12.0, 6.0, 4.0]
+
+
+def test_bytes_are_those_declared_or_those_of_results_like_it(store: Store, remember: Remember) -> None:
+    flat = replace(
+        COSTS.stage, outputs=(Output("costs", ("y", "x", "d"), "float16", "1", ""),), sizes=lambda _: {"d": 7}
+    )
+    known, unknown = replace(COSTS, stage=flat), replace(SPLIT_STEP, id="unknown")
+    assert [part.bytes for part in estimate_parts(plan(known, unknown), store)] == [10 * 4 * 7 * 2, None]
+    remember("sum", 100.0, None, epochs=5)
+    (entry,) = store.entries()
+    assert [part.bytes for part in estimate_parts(plan(unknown), store)] == [entry.size]
+
+
+def test_a_part_without_a_measured_time_is_unknown_on_any_number_of_workers(store: Store) -> None:
+    parts = estimate_parts(plan(COSTS), store)
+    assert [part.seconds_on(8) for part in parts] == [None]
+    assert in_all(parts, 8) == Estimate(0.0, ("blurred",))
 
 
 @pytest.mark.parametrize(("epochs", "seconds"), [(5, 100.0), (50, None)])

@@ -13,7 +13,7 @@ import pytest
 from semidense.cache import Store, module_hash
 from semidense.cache.processes.lease import FolderLease
 from semidense.pipeline.execution.cluster import deployment
-from semidense.pipeline.execution.cluster.deployment import connected, require_able
+from semidense.pipeline.execution.cluster.deployment import connected, count_threads, require_able
 from semidense.pipeline.execution.retry import attempt
 from semidense.pipeline.execution.watch import Unwatched
 from semidense.pipeline.plan.errors import UsageError
@@ -44,6 +44,11 @@ def lease(folder: Path) -> FolderLease:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "lease").touch()
     return FolderLease(folder, folder / "lease")
+
+
+def test_the_threads_of_workers_are_counted(address: str) -> None:
+    assert count_threads(address) == 2
+    assert count_threads("processes:3") == 3
 
 
 def test_workers_that_can_are_told_in_one_line(address: str, tmp_path: Path) -> None:
