@@ -12,6 +12,7 @@ import numpy as np
 from semidense.cache import Draft, Store
 from semidense.pipeline.execution.claims import Claims
 from semidense.pipeline.execution.cluster.proof import require_same
+from semidense.pipeline.execution.tiles import Labelled, labelled, own
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.plan.errors import StageFailed, StageRefused, told_of_stage
 from semidense.pipeline.plan.plan import Made
@@ -33,7 +34,7 @@ class Recent:
     """The products read last by one process in one run; sent to another process, it arrives empty."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[str, dict[str, Array]] = OrderedDict()
+        self._kept: OrderedDict[str, dict[str, Labelled]] = OrderedDict()
         self._lock = threading.Lock()
 
     def __reduce__(self) -> tuple[type["Recent"], tuple[()]]:
@@ -45,18 +46,30 @@ class Recent:
         Raises:
             CacheError: if the entry is missing or damaged.
         """
+        return {name: own(array.values) for name, array in self.open(store, key).items()}
+
+    def open(self, store: Store, key: str) -> Mapping[str, Labelled]:
+        """Return all arrays of an entry, not to be changed: a small one in memory, which all its tiles share.
+
+        Raises:
+            CacheError: if the entry is missing or damaged.
+        """
         with self._lock:
             found = self._kept.get(key)
             if found is not None:
                 self._kept.move_to_end(key)
-        if found is None:
-            found = store.read(key)
-            if _bytes(found) > LARGE:
-                return found
-            self._keep(key, found)
-        return {name: array.copy() for name, array in found.items()}
+        return self._open(store, key) if found is None else found
 
-    def _keep(self, key: str, arrays: dict[str, Array]) -> None:
+    def _open(self, store: Store, key: str) -> dict[str, Labelled]:
+        """Return the arrays of an entry that is not kept; keep a small one."""
+        found = labelled(store.arrays(key))
+        if _bytes(found) > LARGE:
+            return found
+        found = {name: Labelled(own(array.values), array.dims) for name, array in found.items()}
+        self._keep(key, found)
+        return found
+
+    def _keep(self, key: str, arrays: dict[str, Labelled]) -> None:
         """Keep a product, and drop those that were not read for longest."""
         with self._lock:
             self._kept[key] = arrays
@@ -64,8 +77,8 @@ class Recent:
                 self._kept.popitem(last=False)
 
 
-def _bytes(arrays: dict[str, Array]) -> int:
-    return sum(array.nbytes for array in arrays.values())
+def _bytes(arrays: dict[str, Labelled]) -> int:
+    return sum(array.values.nbytes for array in arrays.values())
 
 
 class Unread(Mapping[str, Array]):

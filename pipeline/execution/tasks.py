@@ -100,7 +100,7 @@ def _compute_tile(context: Context, job: Job, rows: Rows) -> Arrays:
     """Return a tile's own rows of a product."""
     step = job.step
     inputs = {
-        product: read_block(context.store.arrays(keys[0]), rows, step.stage, step.params)
+        product: read_block(context.recent.open(context.store, keys[0]), rows, step.stage, step.params)
         for product, keys in job.inputs.items()
     }
     made = _call(step, inputs)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, Union
 
 import numpy as np
 
@@ -29,7 +29,24 @@ def cut_rows(height: int, tile_rows: int) -> tuple[Rows, ...]:
     return tuple(Rows(start, min(start + tile_rows, height), height) for start in range(0, height, tile_rows))
 
 
-def read_block(arrays: "Mapping[str, zarr.Array[Any]]", rows: Rows, stage: Stage, params: Params) -> dict[str, Array]:
+class Labelled(NamedTuple):
+    """An array, in memory or unread, and the names of its dimensions."""
+
+    values: Union[Array, "zarr.Array[Any]"]
+    dims: tuple[str, ...]
+
+
+def labelled(arrays: "Mapping[str, zarr.Array[Any]]") -> dict[str, Labelled]:
+    """Return the arrays of an entry, unread, with the names of their dimensions."""
+    return {name: Labelled(array, dims_of(array)) for name, array in arrays.items()}
+
+
+def own(values: Union[Array, "zarr.Array[Any]"]) -> Array:
+    """Return an array in memory that the caller may change."""
+    return values.copy() if isinstance(values, np.ndarray) else np.asarray(values[...])
+
+
+def read_block(arrays: Mapping[str, Labelled], rows: Rows, stage: Stage, params: Params) -> dict[str, Array]:
     """Return a product's arrays as a tile of ``stage`` needs them.
 
     Arrays with rows are cut to the tile and its halo; with ``border="edge"`` the nearest pixel stands
@@ -39,17 +56,17 @@ def read_block(arrays: "Mapping[str, zarr.Array[Any]]", rows: Rows, stage: Stage
     return {name: _read_rows(array, rows, halo, stage.border == "edge") for name, array in arrays.items()}
 
 
-def _read_rows(array: "zarr.Array[Any]", rows: Rows, halo: int, repeat_edge: bool) -> Array:
+def _read_rows(array: Labelled, rows: Rows, halo: int, repeat_edge: bool) -> Array:
     """Return the rows of a tile with its halo; all of an array that has no rows."""
-    dims = dims_of(array)
+    values, dims = array
     if "y" not in dims:
-        return np.asarray(array[...])
+        return own(values)
     first, last = max(0, rows.start - halo), min(rows.height, rows.stop + halo)
-    values: Array = np.asarray(array[_index(dims, slice(first, last))])
+    cut: Array = np.array(values[_index(dims, slice(first, last))], order="C")
     if not repeat_edge:
-        return values
+        return cut
     margins = {"y": (first - rows.start + halo, rows.stop + halo - last), "x": (halo, halo)}
-    return np.pad(values, [margins.get(dim, (0, 0)) for dim in dims], mode="edge")
+    return np.pad(cut, [margins.get(dim, (0, 0)) for dim in dims], mode="edge")
 
 
 def dims_of(array: "zarr.Array[Any]") -> tuple[str, ...]:

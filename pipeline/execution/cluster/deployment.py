@@ -55,7 +55,7 @@ def count_threads(scheduler: str) -> int:
     if match := _PROCESSES.fullmatch(scheduler):
         return max(1, int(match[1]))
     with connected(scheduler) as client:
-        return max(1, sum(client.nthreads().values()))
+        return max(1, int(sum(client.nthreads().values())))
 
 
 def _where(scheduler: str, stack: ExitStack) -> dict[str, str]:

@@ -89,7 +89,10 @@ def test_a_plan_is_printed_and_nothing_made(invoke: Invoke, there: list[str], ho
     ran = invoke(*how, *there, "--set", "channels.rank_window=15")
     lines = [line.split() for line in ran.out.splitlines()]
     assert lines[0] == ["product", "scene", "state", "key", "why"]
-    assert [line[4:] for line in lines if line[0] == "channels"] == [["channels.rank_window:", "31", "->", "15"]] * 3
+    assert [line[4:] for line in lines[:28] if line[0] == "channels"] == [
+        ["channels.rank_window:", "31", "->", "15"]
+    ] * 3
+    assert (["product", "tasks", "MB"] in [line[:3] for line in lines[28:]]) == ("--dry-run" in how)
     assert lines[-2][:3] == ["reuses", "8", "products,"]
     assert lines[-1][0] == "time:"
     found = only_object(invoke(*how, *there, "--set", "channels.rank_window=15", "--json").out)

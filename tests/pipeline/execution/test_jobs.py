@@ -7,6 +7,8 @@ import pytest
 from semidense.cache import DamagedEntry, Recipe, Store
 from semidense.pipeline.execution import jobs as recent
 from semidense.pipeline.execution.jobs import Recent, Unread
+from semidense.pipeline.execution.tiles import cut_rows, read_block
+from semidense.stages.stage import NoParams, Stage
 
 
 def publish(store: Store, value: float, size: int = 4) -> str:
@@ -23,6 +25,25 @@ def test_what_was_read_once_is_not_read_again(tmp_path: Path, monkeypatch: pytes
     assert kept.read(store, key)["map"].tolist() == [1.5] * 4
     monkeypatch.setattr(Store, "arrays", lambda *_: pytest.fail("read again"))
     assert kept.read(store, key)["map"].tolist() == [1.5] * 4
+
+
+def test_tiles_share_one_reading_of_a_small_product_and_own_their_parts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, kept = Store(tmp_path), Recent()
+    recipe = Recipe("map", {}, {}, {}, {})
+    with store.begin(recipe, {"product": "map"}) as draft:
+        draft.create_array("map", (6, 1), "float64", (2, 1), ("y", "x"), {})
+        draft.write("map", (slice(0, 6), slice(0, 1)), np.arange(6.0)[:, None])
+    opened, real = [], Store.arrays
+    monkeypatch.setattr(Store, "arrays", lambda self, key: opened.append(key) or real(self, key))
+    tiled = Stage("p", (), (), "m:f", tile_rows=2, halo=lambda _: 1)
+    for _ in range(2):
+        for rows, expected in zip(cut_rows(6, 2), ([0, 1, 2], [1, 2, 3, 4], [3, 4, 5]), strict=True):
+            part = read_block(kept.open(store, recipe.key), rows, tiled, NoParams())["map"]
+            assert part.ravel().tolist() == expected
+            part[:] = -1
+    assert opened == [recipe.key]
 
 
 def test_what_a_caller_does_to_it_stays_with_the_caller(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import zarr
 
-from semidense.pipeline.execution.tiles import Rows, cut_rows, dims_of, read_block, trim
+from semidense.pipeline.execution.tiles import Rows, cut_rows, dims_of, labelled, read_block, trim
 from semidense.stages.stage import NoParams, Stage
 
 Arrays = dict[str, Any]
@@ -46,7 +46,7 @@ def arrays(tmp_path: Path) -> Arrays:
     }
     for name, (values, dims) in made.items():
         group.create_array(name, data=values, dimension_names=dims)
-    return dict(group.arrays())
+    return labelled(dict(group.arrays()))
 
 
 ROWS = [Rows(0, 2, 6), Rows(2, 4, 6), Rows(4, 6, 6), Rows(0, 6, 6)]
@@ -79,7 +79,7 @@ def test_the_top_left_corner_repeats_its_pixel(arrays: Arrays) -> None:
 
 def test_what_has_no_rows_comes_whole(arrays: Arrays) -> None:
     assert read_block(arrays, ROWS[1], stage(1, "edge"), NoParams())["d"].tolist() == [4, 5]
-    assert dims_of(arrays["d"]) == ("d",)
+    assert arrays["d"].dims == ("d",)
 
 
 def test_an_array_without_names_has_no_dims(tmp_path: Path) -> None:
