@@ -1,10 +1,14 @@
-"""Planning and running a data set of many scenes that are all cached: ``python -m benchmarks.many_scenes``.
+"""Planning and running a data set of many tiny scenes: ``python -m benchmarks.many_scenes``.
 
-One tiny scene is matched. The products of all scenes are published as copies of its arrays that differ in two bytes, so
-that the cache has as many entries as it would have. Nothing is computed in what is timed.
+- *All cached*: one scene is matched. The products of all scenes are published as copies of its arrays that differ in
+  two bytes, so that the cache has as many entries as it would have. Nothing is computed in what is timed.
+- *Many variants*: the maps of one scene are published under many settings, as sweeps leave them. Planning another
+  setting compares with the nearest of them.
+- *From nothing*: a run of some scenes that are so small that most of the time is not the stages' own.
 """
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +27,10 @@ from semidense.pipeline.results.provenance import ancestry
 
 SECONDS = {"status": 4.0, "run": 5.0, "cache gc --keep": 5.0, "explain --trace": 4.0}
 """What each command may take at 500 scenes."""
+PLANNING = 2.0
+"""Seconds that a plan may take beside 1,000 variants."""
+A_SCENE = 0.1
+"""Seconds that a scene may take in a run from nothing."""
 
 
 def fill(task: Task, donor: Task) -> None:
@@ -53,6 +61,15 @@ def publish(store: Store, step: Step, digests: dict[str, str], arrays: dict[str,
     return draft.publish(0.0, {}).digest
 
 
+def fill_variants(task: Task, variants: int) -> None:
+    """Make the products of a task, and publish its semi-dense map under so many other settings."""
+    made = run(task).made.values()
+    store, (last,) = open_store(task.cache), [each for each in made if each.step.product == "semidense"]
+    arrays, digests = store.read(last.key), {each.step.id: each.digest for each in made}
+    for number in range(variants):
+        publish(store, replace(last.step, settings={**last.step.settings, "variant": number}), digests, arrays)
+
+
 def timed_anew(side: Side) -> float:
     """Return the wall time of one call in a process that has read nothing of the cache, as a command's has not."""
     check.forget()
@@ -64,8 +81,12 @@ def spec(scenes: int) -> str:
     return f"synthetic:train=0,test={scenes},height=48,width=64,disparities=4"
 
 
-def main(scenes: Annotated[int, typer.Option(help="scenes of the data set")] = 500) -> None:
-    """Fill a cache, then time each command over it once, in this process, its imports done before."""
+def main(
+    scenes: Annotated[int, typer.Option(help="scenes of the data set that is cached")] = 500,
+    variants: Annotated[int, typer.Option(help="settings that one map is cached under")] = 1000,
+    fresh: Annotated[int, typer.Option(help="scenes of the run from nothing")] = 50,
+) -> None:
+    """Fill caches, then time each command over them once, in this process, its imports done before."""
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         task = Task(spec(scenes), cache=Path(folder, "cache"))
         fill(task, Task(spec(1), cache=Path(folder, "donor")))
@@ -77,11 +98,19 @@ def main(scenes: Annotated[int, typer.Option(help="scenes of the data set")] = 5
             "explain --trace": lambda: ancestry(open_store(task.cache), key),
         }
         seconds = {name: timed_anew(side) for name, side in sides.items()}
+        varied = Task(spec(1), settings=("semidense.R=0.123",), cache=Path(folder, "variants"))
+        fill_variants(replace(varied, settings=()), variants)
+        planning = timed_anew(lambda: status(varied))
+        from_nothing = timed_anew(lambda: run(Task(spec(fresh), cache=Path(folder, "fresh"))))
     report(
         "many_scenes",
         [
             Ratio(f"{name}, {scenes} scenes, all cached, s", (found,), SECONDS[name] * scenes / 500, at_most=True)
             for name, found in seconds.items()
+        ]
+        + [
+            Ratio(f"status of another setting, {variants} variants cached, s", (planning,), PLANNING, at_most=True),
+            Ratio(f"run of {fresh} scenes from nothing, s a scene", (from_nothing / fresh,), A_SCENE, at_most=True),
         ],
     )
 

@@ -53,7 +53,7 @@ def growth_on_little() -> None:
 
 
 def many_scenes_on_little() -> None:
-    many_scenes.main(scenes=3)
+    many_scenes.main(scenes=3, variants=2, fresh=1)
 
 
 def memory_on_little() -> None:
