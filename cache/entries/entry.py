@@ -168,7 +168,7 @@ class Entry:
             require_sha256("its digest", content["digest"])
             if content["key"] != key:
                 raise ValueError(f"it is the record of {content['key']!r}")
-            return cls(**{**content, "recipe": Recipe.from_dict(plain_mapping("its recipe", content["recipe"]))})
+            return cls(**{**content, "recipe": Recipe.from_dict(content["recipe"])})
         except (ValueError, CacheError) as error:
             raise DamagedEntry(f"the record of {key} is damaged: {error}") from None
 
