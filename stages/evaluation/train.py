@@ -82,7 +82,7 @@ def cut_crop(
     params: EvaluationNetParams,
     samples: EvaluationSamples,
     index: int,
-    scenes: Sequence[NDArray[np.float32]] | Scenes,
+    scenes: Sequence[NDArray[np.float32]] | Scenes[NDArray[np.float32]],
     rng: np.random.Generator,
 ) -> NDArray[np.float32]:
     """Cut out what the grid of one sample depends on; beyond the image the nearest pixel, as in inference.
