@@ -1,6 +1,7 @@
 """Read the very bytes that were hashed: a file may change between the two, and change back."""
 
 import hashlib
+import json
 import stat
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -9,14 +10,17 @@ from pathlib import Path
 
 from semidense.datasets.errors import DatasetError, MissingFileError
 
+_OF_ZARR = ("zarr.json", ".zarray", ".zgroup")
+"""A folder with one of these files is a Zarr array or group, which is read as one."""
+
 
 def file_digest(path: Path) -> str:
-    """Return the sha256 of a file's bytes, in hex.
+    """Return the sha256 of a file's bytes, in hex; of a Zarr folder, that of the names and digests of its files.
 
     Raises:
         MissingFileError: If it cannot be read, or is not a plain file: a pipe would keep the reader waiting.
     """
-    return hashlib.sha256(_read(path)).hexdigest()
+    return _digest(_content(path))
 
 
 @contextmanager
@@ -47,13 +51,27 @@ def exact_files(files: Mapping[str, Path], digests: Mapping[str, str]) -> Iterat
 
 
 def _copied(path: Path, digest: str, folder: Path) -> Path:
-    data = _read(path)
-    if hashlib.sha256(data).hexdigest() != digest:
+    content = _content(path)
+    if _digest(content) != digest:
         raise DatasetError(f"{path}: it was changed since the run was planned; leave it as it is and run again")
-    folder.mkdir()
     copy = folder / path.name
-    copy.write_bytes(data)
+    for name, data in content.items():
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        (copy / name).write_bytes(data)
     return copy
+
+
+def _content(path: Path) -> dict[str, bytes]:
+    """Return the bytes of a file, named "", or of each file in a Zarr folder, by its path in there."""
+    if not any((path / name).is_file() for name in _OF_ZARR):
+        return {"": _read(path)}
+    files = sorted(each.relative_to(path).as_posix() for each in path.rglob("*") if not each.is_dir())
+    return {name: _read(path / name) for name in files}
+
+
+def _digest(content: Mapping[str, bytes]) -> str:
+    digests = {name: hashlib.sha256(data).hexdigest() for name, data in content.items()}
+    return digests[""] if "" in digests else hashlib.sha256(json.dumps(digests).encode()).hexdigest()
 
 
 def _read(path: Path) -> bytes:

@@ -25,8 +25,8 @@ class PairOptions:
         d_min: Smallest disparity to search, pixels.
         d_max: Largest one.
         split: How one picture holds both views: one of `SPLITS`; None if each view has its own file.
-        costs: A NumPy file with a cost volume (y, x, d) of the pair, which takes the place of the matching-Net's; its
-            first disparity is ``d_min``.
+        costs: A cost volume (y, x, d) of the pair, which takes the place of the matching-Net's: NumPy, Zarr or NetCDF;
+            its first disparity is its coordinate ``d``, else ``d_min``, else 0.
         disparity: A file with a disparity map of the left view, which takes the place of the raw disparity.
         scale: Stored value of 1 px in that file; None: recognised.
         none: Stored value of its pixels without a disparity; None: recognised.

@@ -24,7 +24,7 @@ from typing import Any
 from semidense.datasets.errors import DatasetError
 from semidense.datasets.formats.calibration.cameras import PairCalibration
 from semidense.datasets.formats.calibration.reading import read_cameras
-from semidense.datasets.formats.costs import costs_shape
+from semidense.datasets.formats.costs import costs_header
 from semidense.datasets.formats.files import user_path
 from semidense.datasets.formats.images import image_size
 from semidense.datasets.pairs.lists import LISTS, read_list
@@ -82,10 +82,11 @@ def _calibration_of(pair: Pair, options: PairOptions) -> tuple[tuple[Path, ...],
 
 def _source(pair: Pair, options: PairOptions, known: PairCalibration | None, one_view: bool) -> SceneSource:
     files = {"left": pair.left} if one_view else {"left": pair.left, "right": pair.right}
+    size = _view_size(pair, options)
     if options.costs:
         files["costs"] = user_path(options.costs)
-        options = _with_range_of_costs(files["costs"], options)
-    about = described(pair.name, _view_size(pair, options), options, known)
+        options = _with_range_of_costs(files["costs"], options, size)
+    about = described(pair.name, size, options, known)
     source = SceneSource(**about, files=files, one_view=one_view)
     source = replace(source, warnings=(*pair.warnings, *source.warnings))
     if not options.disparity:
@@ -93,17 +94,25 @@ def _source(pair: Pair, options: PairOptions, known: PairCalibration | None, one
     return with_map(source, user_path(options.disparity), options.scale, options.none)
 
 
-def _with_range_of_costs(path: Path, options: PairOptions) -> PairOptions:
+def _with_range_of_costs(path: Path, options: PairOptions, size: tuple[int, int]) -> PairOptions:
     """Return the options with the range that a cost volume covers.
 
     Raises:
-        DatasetError: If the range that was given is another.
+        DatasetError: If the volume is of views of another size, or the range that was given is another.
     """
-    first, count = options.d_min or 0, costs_shape(path)[2]
-    if options.d_max not in (None, first + count - 1):
+    header = costs_header(path)
+    rows, columns, count = header.shape
+    if (rows, columns) != size:
         raise DatasetError(
-            f"{path}: {count} disparities from {first} px on, but d_max={options.d_max} was given; leave it out"
+            f"{path}: {rows} x {columns} pixels with {count} disparities, but the left view has {size[0]} x {size[1]}; "
+            "a cost volume has dims y, x, d"
         )
+    first = header.first if header.first is not None else options.d_min or 0
+    for key, given, told in (("d_min", options.d_min, first), ("d_max", options.d_max, first + count - 1)):
+        if given not in (None, told):
+            raise DatasetError(
+                f"{path}: {count} disparities from {first} px on, but {key}={given} was given; leave it out"
+            )
     return replace(options, d_min=first, d_max=first + count - 1)
 
 

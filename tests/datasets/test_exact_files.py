@@ -47,3 +47,18 @@ def test_only_plain_files_are_opened(tmp_path: Path) -> None:
     for path in (tmp_path / "pipe", tmp_path, tmp_path / "none", Path("/dev/zero")):
         with pytest.raises(MissingFileError, match=rf"^{path}: cannot be read"):
             file_digest(path)
+
+
+def test_a_zarr_folder_is_one_content(tmp_path: Path) -> None:
+    """A name, a byte or a file more makes another digest; what is read is a copy of all that was hashed."""
+    store = tmp_path / "v.zarr"
+    (store / "c").mkdir(parents=True)
+    (store / "zarr.json").write_text("{}")
+    (store / "c" / "0").write_bytes(b"cost")
+    digest = file_digest(store)
+    with exact_files({"costs": store}, {"costs": digest}) as files:
+        (store / "c" / "0").rename(store / "c" / "1")
+        assert (files["costs"] / "c" / "0").read_bytes() == b"cost"
+    assert file_digest(store) != digest
+    with pytest.raises(DatasetError, match="it was changed"):
+        exact_files({"costs": store}, {"costs": digest}).__enter__()

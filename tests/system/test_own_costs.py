@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from PIL import Image
 
 from semidense.datasets import DatasetError
@@ -69,10 +70,23 @@ def test_a_range_that_does_not_fit_is_refused(options: tuple[str, ...], message:
         Task(spec(pair, *options)).open()
 
 
-def test_a_volume_of_another_size_is_refused(pair: Path) -> None:
-    np.save(pair / "volume.npy", np.zeros((40, 47, 8), np.float32))
-    with pytest.raises(ValueError, match="cost volume of 40 x 47, but 40 x 48 was listed"):
-        api.run(Task(spec(pair), settings=FAST, cache=pair / "cache"), "costvolume")
+def test_a_volume_of_another_size_or_order_is_refused(pair: Path) -> None:
+    for shape, told in (((40, 47, 8), "40 x 47 pixels with 8"), ((8, 40, 48), "8 x 40 pixels with 48")):
+        np.save(pair / "volume.npy", np.zeros(shape, np.float32))
+        with pytest.raises(DatasetError, match=f"{told} disparities, but the left view has 40 x 48"):
+            Task(spec(pair)).open()
+
+
+def test_a_volume_in_zarr_or_netcdf_brings_its_range(pair: Path) -> None:
+    costs = xr.DataArray(np.load(pair / "volume.npy"), dims=("y", "x", "d"), coords={"d": np.arange(2, 10)})
+    costs.to_dataset(name="cost").to_zarr(pair / "volume.zarr", consolidated=False)
+    costs.transpose("d", "y", "x").to_netcdf(pair / "volume.nc")
+    for name in ("volume.zarr", "volume.nc"):
+        task = Task(spec(pair).replace("volume.npy", name), settings=FAST, cache=pair / "cache")
+        disparity = api.run(task, "disparity").open("disparity")["disparity"].values
+        assert np.unique(disparity[:, 5:]).tolist() == [5.0]
+    with pytest.raises(DatasetError, match="8 disparities from 2 px on, but d_min=0"):
+        Task(spec(pair, "d_min=0").replace("volume.npy", "volume.nc")).open()
 
 
 def test_both_kinds_of_volume_are_declared_alike() -> None:
