@@ -23,8 +23,9 @@ PresetOption = Annotated[
     str | None,
     typer.Option(
         "--preset",
-        help="Settings to start from: paper (the method of the paper), or robust (fewer wrong pixels where texture is "
-        "thin) [default: that of a config.json; else robust for match, paper for others].",
+        help="Settings to start from: paper (the method of the paper), robust (fewer wrong pixels where texture is "
+        "thin) or foreign (confidence of maps that another matcher made) [default: that of a config.json; else robust "
+        "for match, paper for others].",
     ),
 ]
 ModeOption = Annotated[
@@ -87,6 +88,30 @@ DryRunOption = Annotated[
     typer.Option("--dry-run", help="Print what would be reused, and what would be made in what time; make nothing."),
 ]
 FormatOption = Annotated[str, typer.Option("--format", help="Formats of the maps, with commas.")]
+UnitOption = Annotated[
+    str | None, typer.Option(help="Unit of length in the calibration, if the file does not say: mm, cm or m.")
+]
+CalibOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Calibration file (Middlebury, OpenCV, KITTI, JSON, ...), for depth; of ROS both files, left first."
+    ),
+]
+ThresholdOption = Annotated[
+    float | None, typer.Option("--R", help="Keep disparities of at least this confidence, 0 to 1 [default: 0.9].")
+]
+DensityOption = Annotated[
+    str | None,
+    typer.Option(help="Instead of --R: keep the most confident pixels, this share of the image, such as 80%."),
+]
+MaxErrorOption = Annotated[
+    str | None,
+    typer.Option(
+        "--max-error",
+        help="Instead of --R: keep as many pixels as this share of errors allows, such as 2%. `match` needs a "
+        "calibration for it, which --preset paper has; `score` needs none.",
+    ),
+]
 ProductArgument = Annotated[str, typer.Argument(help="A product, such as costvolume, disparity or confidence.")]
 
 

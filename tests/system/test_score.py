@@ -54,6 +54,25 @@ def test_one_command_from_a_map_to_a_folder(invoke: Invoke, folder: Path, tmp_pa
     assert about["map_reading"] == {"scale": 1.0, "none": None}
 
 
+def test_a_plan_a_file_of_settings_and_no_progress(invoke: Invoke, folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "half.toml").write_text("[semidense]\nR = 0.5\n")
+    arguments = [
+        "score",
+        folder / "left.png",
+        folder / "map.pfm",
+        "--config",
+        tmp_path / "half.toml",
+        "-o",
+        tmp_path / "o",
+    ]
+    planned = invoke(*arguments, "--dry-run", "--json", "--cache", tmp_path / "cache")
+    steps = json.loads(planned.out)["steps"]
+    assert {"foreign_net", "semidense"} <= {step["product"] for step in steps}
+    assert not (tmp_path / "o").exists() and {step["state"] for step in steps} == {"missing"}
+    ran = invoke(*arguments, "-q", "--format", "pfm", "--cache", folder / "cache")
+    assert ran.code == 0 and "at R = 0.5" in ran.out and not ran.err
+
+
 def test_the_right_view_tells_right_from_wrong(folder: Path) -> None:
     """In noise the map itself says little; our costs of its disparities say it all."""
     found = pipeline.score(folder / "left.png", folder / "map.pfm", folder / "right.png", cache=folder / "cache")

@@ -9,14 +9,20 @@ import typer
 
 from semidense.pipeline.cli.options import (
     CacheOption,
+    CalibOption,
     ConfigOption,
+    DensityOption,
     DryRunOption,
+    FormatOption,
     JsonOption,
+    MaxErrorOption,
     ModeOption,
     PresetOption,
     QuietOption,
     SchedulerOption,
     SetOption,
+    ThresholdOption,
+    UnitOption,
     VerboseOption,
     WorkersOption,
     chosen,
@@ -56,34 +62,15 @@ def match(
     max_disp: Annotated[
         int | None, typer.Option(help="Largest disparity to search, px [default: as for --min-disp].")
     ] = None,
-    calib: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Calibration file (Middlebury, OpenCV, KITTI, JSON, ...), for depth; of ROS both files, left first."
-        ),
-    ] = None,
+    calib: CalibOption = None,
     split: Annotated[
         str | None,
         typer.Option(help="LEFT is one image of both views: side-by-side, or over-under (the left view above)."),
     ] = None,
-    unit: Annotated[
-        str | None, typer.Option(help="Unit of length in the calibration, if the file does not say: mm, cm or m.")
-    ] = None,
-    threshold: Annotated[
-        float | None, typer.Option("--R", help="Keep disparities of at least this confidence, 0 to 1 [default: 0.9].")
-    ] = None,
-    density: Annotated[
-        str | None,
-        typer.Option(help="Instead of --R: keep the most confident pixels, this share of the image, such as 80%."),
-    ] = None,
-    max_error: Annotated[
-        str | None,
-        typer.Option(
-            "--max-error",
-            help="Instead of --R: keep as many pixels as this share of errors allows, such as 2%; needs a calibration, "
-            "which --preset paper has.",
-        ),
-    ] = None,
+    unit: UnitOption = None,
+    threshold: ThresholdOption = None,
+    density: DensityOption = None,
+    max_error: MaxErrorOption = None,
     calibrated: Annotated[
         bool,
         typer.Option(
@@ -108,7 +95,7 @@ def match(
         ),
     ] = False,
     right_view: Annotated[bool, typer.Option("--right-view", help="Also write the right view's raw map.")] = False,
-    formats: Annotated[str, typer.Option("--format", help="Formats of the maps, with commas.")] = "pfm,png,tiff,npy",
+    formats: FormatOption = "pfm,png,tiff,npy",
     scene: Annotated[
         list[str] | None, typer.Option("--scene", help="Match this pair only; repeat the option for several.")
     ] = None,

@@ -8,16 +8,28 @@ import typer
 
 from semidense.pipeline.cli.options import (
     CacheOption,
+    CalibOption,
+    ConfigOption,
+    DensityOption,
+    DryRunOption,
     FormatOption,
     JsonOption,
+    MaxErrorOption,
+    QuietOption,
     SetOption,
+    ThresholdOption,
+    UnitOption,
+    VerboseOption,
     WorkersOption,
+    config_file,
     map_formats,
     share,
 )
 
 if TYPE_CHECKING:
+    from semidense.pipeline.api import Task
     from semidense.pipeline.pairs.score import Score
+    from semidense.pipeline.pairs.wishes import Wishes
 
 
 def register(app: typer.Typer) -> None:
@@ -42,30 +54,19 @@ def score(
         float | None,
         typer.Option(help="Stored value of pixels without a disparity, such as -1 [default: recognised]."),
     ] = None,
-    calib: Annotated[
-        list[str] | None, typer.Option(help="Calibration file, for depth and points; as for `match`.")
-    ] = None,
-    unit: Annotated[
-        str | None, typer.Option(help="Unit of length in the calibration, if the file does not say: mm, cm or m.")
-    ] = None,
-    threshold: Annotated[
-        float | None, typer.Option("--R", help="Keep disparities of at least this confidence, 0 to 1 [default: 0.9].")
-    ] = None,
-    density: Annotated[
-        str | None,
-        typer.Option(help="Instead of --R: keep the most confident pixels, this share of the image, such as 80%."),
-    ] = None,
-    max_error: Annotated[
-        str | None,
-        typer.Option(
-            "--max-error",
-            help="Instead of --R: keep as many pixels as this share of expected errors allows, such as 2%.",
-        ),
-    ] = None,
+    calib: CalibOption = None,
+    unit: UnitOption = None,
+    threshold: ThresholdOption = None,
+    density: DensityOption = None,
+    max_error: MaxErrorOption = None,
     formats: FormatOption = "pfm,png,tiff,npy",
     settings: SetOption = None,
+    config: ConfigOption = None,
+    dry_run: DryRunOption = False,
     workers: WorkersOption = None,
     cache: CacheOption = None,
+    verbose: VerboseOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Score a disparity map that any matcher made.
@@ -73,26 +74,30 @@ def score(
     Writes its confidence, and what is left of the map if only trusted disparities are kept.
     """
     from semidense.datasets.pairs.options import PairOptions, pair_spec
-    from semidense.pipeline.api import Task
+    from semidense.pipeline import api
+    from semidense.pipeline.cli import console
     from semidense.pipeline.pairs.wishes import Wishes
     from semidense.pipeline.plan.presets import FOREIGN
 
     options = PairOptions(tuple(calib or ()), unit, disparity=disparity, scale=scale, none=none)
     spec = pair_spec([left] if right is None else [left, right], options)
     wishes = Wishes(R=threshold, density=share("density", density), max_error=share("max-error", max_error))
-    task = Task(spec, settings=tuple(settings or ()), cache=cache, preset=FOREIGN)
-    scored, about = _carry_out(task, wishes, output, map_formats(formats), workers)
+    task = api.Task(spec, (), tuple(settings or ()), config_file(config), cache=cache, preset=FOREIGN)
+    kinds = map_formats(formats)
+    if dry_run:
+        plan = api.status(task.and_settings(wishes.settings), wishes.product)
+        return console.show_plan(plan, api.open_store(cache), as_json)
+    scored, about = _carry_out(task, wishes, output, kinds, workers, verbose - quiet)
     for warning in scored.warnings:
         print(f"warning: {scored.scene.name}: {warning}", file=sys.stderr)
     if as_json:
-        from semidense.pipeline.cli.console import print_json
-
-        print_json({"pairs": [about]})
-    else:
-        _say(scored, about)
+        return console.print_json({"pairs": [about]})
+    return _say(scored, about)
 
 
-def _carry_out(task: Any, wishes: Any, output: Path, kinds: list[str], workers: int | None) -> tuple["Score", Any]:  # noqa: ANN401
+def _carry_out(
+    task: "Task", wishes: "Wishes", output: Path, kinds: list[str], workers: int | None, detail: int
+) -> tuple["Score", dict[str, Any]]:
     from dataclasses import replace
 
     from semidense.pipeline.cli.console import announce
@@ -101,8 +106,8 @@ def _carry_out(task: Any, wishes: Any, output: Path, kinds: list[str], workers: 
     from semidense.pipeline.pairs.score import score_one
 
     task = replace(task, dataset=task.open())
-    require_place(task.dataset.scenes, output, kinds)
-    with ProgressWatch(announce) as watch:
+    require_place(task.open().scenes, output, kinds)
+    with ProgressWatch(announce, detail) as watch:
         scored = score_one(task, wishes, watch=watch, workers=workers)
     return scored, save(scored, output, kinds)
 
