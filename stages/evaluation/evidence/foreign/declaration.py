@@ -32,8 +32,7 @@ KINDS = (
 class ForeignSamplesParams(Params):
     """Which pixels of which maps the net learns from."""
 
-    rows: int = Field(32, ge=1, description="rows of each map that are looked at, at a random height")
-    pixels: int = Field(1500, ge=1, description="pixels of each map, drawn at random from these rows")
+    pixels: int = Field(2000, ge=1, description="pixels of each map, drawn at random")
     precision: Precision = Field(
         "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
     )
@@ -43,7 +42,7 @@ class ForeignSamplesParams(Params):
 class ForeignNetParams(Schedule):
     """How the net that scores foreign maps learns."""
 
-    steps: int = Field(3000, ge=1, description="optimiser steps")
+    steps: int = Field(1500, ge=1, description="optimiser steps")
     optimiser: Literal["muon", "adam"] = Field("adam", description="what makes a step of a large kernel's gradient")
     peak_rate: float = Field(0.01, gt=0, description="highest learning rate")
     checkpoint_steps: int = Field(500, ge=1, description="steps between two checkpoints", exclude=True)

@@ -27,7 +27,14 @@ def test_the_map_tells_what_it_looks_like() -> None:
     np.testing.assert_allclose(told["column"][0, [0, 15, 29]], [-2, 9, 23], atol=1e-5)
     assert np.isclose(told["step"][0, 14], 4, atol=1e-5) and told["step"][0, 3] == 0
     assert np.isclose(told["known 9"][4, 20], 80 / 81, atol=1e-5)
-    assert (told["texture 9"] > 10).all()
+    np.testing.assert_allclose(told["edge"][0, :15], np.arange(14, -1, -1), atol=1e-5)
+    assert (told["distinctiveness"] > 10).all()
+
+
+def test_a_map_without_a_step_is_far_from_any() -> None:
+    told = known(np.full((8, 30), 2, np.float32))
+    np.testing.assert_allclose(told["edge"], 50, atol=1e-4)
+    assert np.allclose(told["support"], 1)
 
 
 def test_without_a_right_view_the_costs_are_silent() -> None:

@@ -37,12 +37,12 @@ def sampled() -> dict[str, dict[str, np.ndarray]]:
 
 def test_every_kind_of_map_is_drawn_from() -> None:
     given = sampled()
-    made = draw_foreign_samples(ForeignSamplesParams(rows=6, pixels=40, precision="float32"), given)
+    made = draw_foreign_samples(ForeignSamplesParams(pixels=40, precision="float32"), given)
     assert list(made) == [output.name for output in FOREIGN_SAMPLES.outputs]
     assert made["features"].dtype == made["error"].dtype == np.float32 and made["kind"].dtype == np.int8
     assert np.bincount(made["kind"]).max() <= 40 and np.isfinite(made["error"]).all()
     assert np.unique(made["kind"]).tolist() == list(range(len(KINDS)))
-    again = draw_foreign_samples(ForeignSamplesParams(rows=6, pixels=40, precision="float32"), given)
+    again = draw_foreign_samples(ForeignSamplesParams(pixels=40, precision="float32"), given)
     assert all(np.array_equal(made[name], again[name]) for name in made)
 
 
