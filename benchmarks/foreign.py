@@ -1,19 +1,22 @@
-"""Our score of other matchers' maps: ``python -m benchmarks.foreign middlebury:DIR/MiddEval3/trainingQ``.
+"""Our score of other matchers' maps: ``python -m benchmarks.foreign middlebury:DIR/trainingQ --pandora MAPS``.
 
-Each matcher's dense map is ordered by our score without and with the right view, and by the evaluation-Net alone: the
-area under the error curve of each, and of a perfect order. Beside them is how many of the pixels that the matcher's own
-checks keep are wrong, and how many of as many pixels, and of 70 %, that our score keeps. Pixels that both views see,
-wrong above 1 px.
+Each matcher's dense map is ordered by our score without and with the right view, by the evaluation-Net alone, by the
+difference to the matcher's map of the right view, and Pandora's maps by its own ambiguity and risk: the area under the
+error curve of each, and of a perfect order. Beside them is how many of the pixels that the matcher's own checks keep
+are wrong, and how many of as many pixels, and of 70 %, that our score keeps and that a perfect order would. Pixels that
+both views see, wrong above 1 px. MAPS is what ``python -m benchmarks.pandora`` wrote; without it Pandora is left out.
 """
 
 import argparse
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.datasets import SceneSource, open_dataset
+from semidense.datasets import SceneSource, Truth, open_dataset, read_pfm
 from semidense.pipeline.plan.images_and_truth import read_images
 from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
 from semidense.stages.catalog import STAGES
@@ -29,29 +32,84 @@ from semidense.stages.transforms.channels import channels
 TOLERANCE = 1.0
 DENSITY = 0.7
 NETS = ("evaluation_net", "foreign_net", "descriptor_net")
-COLUMNS = ("AUC net", "AUC left", "AUC both", "perfect", "checks %", "kept %", "left %", "both %", "left 70", "both 70")
+PANDORA = "pandora"
+MEASURES = ("net", "left", "both", "views", "ambiguity", "risk")
+COLUMNS = (*MEASURES, "perfect", "checks %", "kept %", "left %", "both %", "left 70", "both 70", "least 70")
+"""Areas under the error curve first: of the evaluation-Net alone, our score with the left view and with both, the
+difference between the matcher's maps of both views, Pandora's two measures, a perfect order."""
 
 
-def figures(scene: SceneSource, matcher: str, nets: Mapping[str, Any]) -> list[float]:
-    """Return the figures of one map, in the order of ``COLUMNS``."""
-    found = scene.load()
-    truth, stage, given = found.truth, STAGES[matcher], {"images": read_images(scene, {})}
-    if truth is None:
-        return [np.nan] * len(COLUMNS)
+@dataclass(frozen=True)
+class Matched:
+    """A matcher's map of a scene.
+
+    Attributes:
+        dense: (y, x) float32, px, before its checks.
+        checked: the same after them.
+        measures: (y, x) float32 by name, of ``MEASURES``: confidences of its own, higher is surer.
+    """
+
+    dense: NDArray[np.float32]
+    checked: NDArray[np.float32]
+    measures: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+
+
+def matched(scene: SceneSource, matcher: str) -> Matched:
+    """Return the map of one of ``MATCHERS``, and how well it agrees with its map of the right view."""
+    stage = STAGES[matcher]
     bounds = {"d_min": scene.disparities.minimum, "d_max": scene.disparities.maximum}
-    made = stage.function()(stage.params.model_validate(bounds), given)
-    checks = Errors.of(made["disparity"], truth.disparity, truth.nonocc)
+    params, images = stage.params.model_validate(bounds), read_images(scene, {})
+    made = stage.function()(params, {"images": images})
+    # Mirrored, the right view is a left one.
+    swapped = {"left": images["right"][:, ::-1], "right": images["left"][:, ::-1], "moments": images["moments"][::-1]}
+    of_right = stage.function()(params, {"images": swapped})["dense"][:, ::-1]
+    return Matched(made["dense"], made["disparity"], {"views": -_difference(made["dense"], of_right)})
+
+
+def _difference(left: NDArray[np.float32], right: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the difference to the disparity that the right view has where each disparity leads; infinite: none."""
+    rows, columns = np.indices(left.shape)
+    seen = np.rint(columns - np.nan_to_num(left)).astype(np.intp)
+    inside = (seen >= 0) & (seen < left.shape[1])
+    there = right[rows, np.clip(seen, 0, left.shape[1] - 1)]
+    found: NDArray[np.float32] = np.nan_to_num(np.where(inside, np.abs(left - there), np.nan), nan=np.inf)
+    return found
+
+
+def read_pandora(scene: SceneSource, folder: Path) -> Matched:
+    """Return Pandora's map of a scene and its two confidences, as ``benchmarks.pandora`` wrote them."""
+    start = folder / scene.name.rsplit("/", 1)[-1]
+    measures = {name: np.load(f"{start}.{name}.npy") for name in ("ambiguity", "risk")}
+    return Matched(read_pfm(Path(f"{start}.pfm")), read_pfm(Path(f"{start}.checked.pfm")), measures)
+
+
+def figures(scene: SceneSource, found: Matched, nets: Mapping[str, Any]) -> list[float]:
+    """Return the figures of one map, in the order of ``COLUMNS``; NaN: the matcher has no such measure."""
+    loaded = scene.load()
+    if loaded.truth is None:
+        return [np.nan] * len(COLUMNS)
+    block = _block(read_images(scene, {}), found.dense, channels(loaded.left, loaded.right), nets)
+    left, both = (_score(block, right) for right in (False, True))
+    measures = {"net": left["network"], "left": left["confidence"], "both": both["confidence"], **found.measures}
+    return [*_areas(loaded.truth, found.dense, measures), *_filtered(loaded.truth, found, left, both)]
+
+
+def _areas(truth: Truth, dense: NDArray[np.float32], measures: Mapping[str, NDArray[np.float32]]) -> Iterator[float]:
+    """Yield the area under the error curve by each of ``MEASURES``, and by a perfect order."""
+    areas = {name: ranked(dense, each, truth.disparity, truth.nonocc)[TOLERANCE] for name, each in measures.items()}
+    yield from (areas[name]["auc"] if name in areas else np.nan for name in MEASURES)
+    yield areas["net"]["auc_optimal"]
+
+
+def _filtered(truth: Truth, found: Matched, *scores: Mapping[str, NDArray[np.float32]]) -> Iterator[float]:
+    """Yield what is wrong, %, of what the matcher's checks keep, and of as many and 70 % that a score keeps."""
+    checks = Errors.of(found.checked, truth.disparity, truth.nonocc)
     kept = 1 - checks.invalid() / 100
-    block = _block(given["images"], made["dense"], channels(found.left, found.right), nets)
-    scores = [_score(block, right) for right in (False, True)]
-    areas = [
-        ranked(made["dense"], score, truth.disparity, truth.nonocc)[TOLERANCE]
-        for score in (scores[0]["network"], scores[0]["confidence"], scores[1]["confidence"])
-    ]
-    correct = Errors.of(made["dense"], truth.disparity, truth.nonocc).absolute <= TOLERANCE
+    yield from (checks.bad(TOLERANCE), 100 * kept)
+    correct = Errors.of(found.dense, truth.disparity, truth.nonocc).absolute <= TOLERANCE
     judged = [score["confidence"][counted(truth.disparity, truth.nonocc)] for score in scores]
-    errors = [error_at_density(each, correct, share) for share in (kept, DENSITY) for each in judged]
-    return [*(area["auc"] for area in areas), areas[0]["auc_optimal"], checks.bad(TOLERANCE), 100 * kept, *errors]
+    yield from (error_at_density(each, correct, share) for share in (kept, DENSITY) for each in judged)
+    yield error_at_density(correct.astype(np.float32), correct, DENSITY)
 
 
 def _score(block: Mapping[str, Any], right: bool) -> Mapping[str, NDArray[np.float32]]:
@@ -69,12 +127,17 @@ def _block(images: Mapping[str, Array], disparity: Array, views: Array, nets: Ma
     }
 
 
-def rows(dataset: str, matchers: list[str]) -> Iterator[tuple[str, str, list[float]]]:
+def rows(dataset: str, matchers: list[str], pandora: Path | None) -> Iterator[tuple[str, str, list[float]]]:
     """Yield matcher, scene and figures."""
     nets = {name: read_network(shipped_weights(name, "exact"), {}) for name in NETS}
-    for matcher in matchers:
+    for matcher in [*matchers, *([PANDORA] if pandora else [])]:
         for scene in open_dataset(dataset).scenes:
-            yield matcher, scene.name, figures(scene, matcher, nets)
+            is_read = matcher == PANDORA and pandora is not None
+            yield (
+                matcher,
+                scene.name,
+                figures(scene, read_pandora(scene, pandora) if is_read else matched(scene, matcher), nets),
+            )
 
 
 def main() -> None:
@@ -82,14 +145,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("dataset")
     parser.add_argument("--matcher", action="append", choices=MATCHERS, help="may be repeated; default: all")
+    parser.add_argument("--pandora", type=Path, help="folder that benchmarks.pandora wrote")
     given = parser.parse_args()
     print(f"{'':24}" + "".join(f"{name:>10}" for name in COLUMNS))
     by_matcher: dict[str, list[list[float]]] = {}
-    for matcher, scene, found in rows(given.dataset, given.matcher or [*MATCHERS]):
+    for matcher, scene, found in rows(given.dataset, given.matcher or [*MATCHERS], given.pandora):
         by_matcher.setdefault(matcher, []).append(found)
         print(_line(f"{matcher} {scene}", found), flush=True)
     for matcher, each in by_matcher.items():
-        print(_line(f"{matcher}, mean", np.nanmean(each, axis=0)))
+        print(_line(f"{matcher}, mean", np.mean(each, axis=0)))
 
 
 def _line(name: str, found: list[float] | NDArray[np.float64]) -> str:

@@ -1,0 +1,60 @@
+"""The table of other matchers' maps, and the maps that Pandora's environment gives it."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import foreign, pandora
+from benchmarks.peers import PeerError
+from semidense.datasets import open_dataset
+
+TINY = "synthetic:train=0,test=1,height=48,width=64,disparities=4"
+STAND_IN = """
+import sys
+import numpy as np
+folder, costs = sys.argv[1:]
+given = np.load(f"{folder}/pair.npz")
+size, (first, last) = given["left"].shape, given["disparities"]
+valid = np.arange(size[1]) >= 8
+np.savez(f"{folder}/found.npz", disparity=np.full(size, last), valid=np.tile(valid, (size[0], 1)),
+         ambiguity=np.ones(size, np.float32), risk=np.zeros(size, np.float32))
+"""
+
+
+def test_views_that_agree_differ_by_nothing() -> None:
+    left = np.float32([[0, 1, 1, np.nan, 9]])
+    right = np.float32([[0, 3, 5, 5, 5]])
+    assert foreign._difference(left, right).tolist() == [[0, 1, 2, np.inf, np.inf]]
+
+
+def test_pandoras_maps_go_into_the_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(pandora, "_PAIR", STAND_IN)
+    (scene,) = open_dataset(TINY).scenes
+    found = pandora.match(Path(sys.executable), scene, "census", tmp_path / "work")
+    assert np.isnan(found["checked"][:, :8]).all() and np.isfinite(found["disparity"]).all()
+    pandora.write(found, scene.name, tmp_path)
+    read = foreign.read_pandora(scene, tmp_path)
+    np.testing.assert_array_equal(read.checked, found["checked"])
+    monkeypatch.setattr(sys, "argv", ["foreign", TINY, "--matcher", "sgm", "--pandora", str(tmp_path)])
+    foreign.main()
+    _, *rows = (line.split() for line in capsys.readouterr().out.splitlines())
+    assert [row[0] for row in rows] == ["sgm", "pandora", "sgm,", "pandora,"]
+    by_matcher = {row[0]: dict(zip(foreign.COLUMNS, map(float, row[2:]), strict=True)) for row in rows[:2]}
+    assert np.isnan(by_matcher["sgm"]["risk"]) and np.isnan(by_matcher["pandora"]["views"])
+    for row in by_matcher.values():
+        assert row["perfect"] <= min(row[name] for name in ("net", "left", "both"))
+        assert row["least 70"] <= min(row["left 70"], row["both 70"])
+    # A measure that tells nothing leaves the share of wrong pixels as it is, at every density.
+    wrong = pandora.figures(scene, found)[0]
+    assert np.isclose(100 * by_matcher["pandora"]["risk"], wrong, atol=0.05)
+
+
+def test_a_pandora_that_does_not_run_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pandora, "_PAIR", "raise SystemExit('no plugin')")
+    (scene,) = open_dataset(TINY).scenes
+    with pytest.raises(PeerError, match=r"Pandora fails on .*no plugin$"):
+        pandora.match(Path(sys.executable), scene, "census", tmp_path / "work")
