@@ -127,29 +127,30 @@ def _block(images: Mapping[str, Array], disparity: Array, views: Array, nets: Ma
     }
 
 
-def rows(dataset: str, matchers: list[str], pandora: Path | None) -> Iterator[tuple[str, str, list[float]]]:
+def rows(dataset: str, matchers: list[str], pandora: Path) -> Iterator[tuple[str, str, list[float]]]:
     """Yield matcher, scene and figures."""
     nets = {name: read_network(shipped_weights(name, "exact"), {}) for name in NETS}
-    for matcher in [*matchers, *([PANDORA] if pandora else [])]:
+    for matcher in matchers:
         for scene in open_dataset(dataset).scenes:
-            is_read = matcher == PANDORA and pandora is not None
-            yield (
-                matcher,
-                scene.name,
-                figures(scene, read_pandora(scene, pandora) if is_read else matched(scene, matcher), nets),
-            )
+            found = read_pandora(scene, pandora) if matcher == PANDORA else matched(scene, matcher)
+            yield matcher, scene.name, figures(scene, found, nets)
 
 
 def main() -> None:
     """Print a row a map, and the means of each matcher."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("dataset")
-    parser.add_argument("--matcher", action="append", choices=MATCHERS, help="may be repeated; default: all")
+    parser.add_argument(
+        "--matcher", action="append", choices=(*MATCHERS, PANDORA), help="may be repeated; default: all"
+    )
     parser.add_argument("--pandora", type=Path, help="folder that benchmarks.pandora wrote")
     given = parser.parse_args()
+    chosen = given.matcher or [*MATCHERS, *([PANDORA] if given.pandora else [])]
+    if PANDORA in chosen and not given.pandora:
+        parser.error("--matcher pandora needs its maps: --pandora FOLDER")
     print(f"{'':24}" + "".join(f"{name:>10}" for name in COLUMNS))
     by_matcher: dict[str, list[list[float]]] = {}
-    for matcher, scene, found in rows(given.dataset, given.matcher or [*MATCHERS], given.pandora):
+    for matcher, scene, found in rows(given.dataset, chosen, given.pandora):
         by_matcher.setdefault(matcher, []).append(found)
         print(_line(f"{matcher} {scene}", found), flush=True)
     for matcher, each in by_matcher.items():

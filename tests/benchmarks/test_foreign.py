@@ -39,7 +39,9 @@ def test_pandoras_maps_go_into_the_table(
     pandora.write(found, scene.name, tmp_path)
     read = foreign.read_pandora(scene, tmp_path)
     np.testing.assert_array_equal(read.checked, found["checked"])
-    monkeypatch.setattr(sys, "argv", ["foreign", TINY, "--matcher", "sgm", "--pandora", str(tmp_path)])
+    monkeypatch.setattr(
+        sys, "argv", ["foreign", TINY, "--matcher", "sgm", "--matcher", "pandora", "--pandora", str(tmp_path)]
+    )
     foreign.main()
     _, *rows = (line.split() for line in capsys.readouterr().out.splitlines())
     assert [row[0] for row in rows] == ["sgm", "pandora", "sgm,", "pandora,"]
