@@ -49,7 +49,11 @@ def main(
     _print(
         "% wrong: dense, at SGBM's density, R = 0.9", found, [f"{name}>{t:g}" for t in THRESHOLDS for name in _SHARES]
     )
-    _print("what is kept, and the order", found, ["scenes", "kept, SGBM", "kept, R = 0.9", "AUC", "ECE > 1 px"])
+    _print(
+        "what is kept, and the order",
+        found,
+        ["scenes", "kept, SGBM", "kept, R = 0.9", "AUC", *(f"ECE > {limit:g} px" for limit in THRESHOLDS)],
+    )
     _print("a wanted error: % wrong of % kept", found, [f"{w:g} {what}" for w in WISHES for what in _KEPT])
 
 
@@ -125,7 +129,10 @@ def _of_scene(result: Result, scene: str) -> Figures:
         "kept, SGBM": 100 * maps.sgm_share,
         "kept, R = 0.9": 100 * float(kept[maps.mask].mean()),
         "AUC": ranking.auc(right),
-        "ECE > 1 px": _calibration_error(maps.chance[maps.mask], right),
+        **{
+            f"ECE > {limit:g} px": _calibration_error(maps.chance[maps.mask], maps.right(maps.own, limit)[maps.mask])
+            for limit in THRESHOLDS
+        },
         **{name: value for limit in THRESHOLDS for name, value in _shares(maps, kept, ranking, limit).items()},
         **{name: value for wish in WISHES for name, value in _promised(maps, wish).items()},
     }
