@@ -17,11 +17,14 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
-from typing import TypeGuard
+from threading import RLock
+from typing import Any, TypeGuard
 
 from semidense.cache.document import digest
 from semidense.cache.errors import EditedSource, SourceNotFound
 from semidense.cache.keys.imported import Stamp, process_start, stamp_of
+
+_PARSING = RLock()
 
 
 @dataclass(frozen=True)
@@ -117,13 +120,19 @@ def require_imported_as_hashed(modules: Iterable[str]) -> None:
         _settled.add(name)
 
 
+def _parsed(text: str | bytes) -> ast.Module:
+    """Return a source's syntax tree, made by one thread at a time: Python 3.11 fails now and then when two make one."""
+    with _PARSING:
+        return ast.parse(text)
+
+
 def bare_tree(text: str | bytes) -> ast.AST:
     """Return a source's syntax tree without docstrings, all that its hash is over.
 
     Raises:
         SyntaxError, ValueError: if it is no Python.
     """
-    tree: ast.AST = _Bare().visit(ast.parse(text))
+    tree: ast.AST = _Bare().visit(_parsed(text))
     return tree
 
 
@@ -200,7 +209,7 @@ def _read(module: _Module) -> _Source:
     file, is_imported = module.file or Path(), module.name in sys.modules
     try:
         stamp, data = stamp_of(file), file.read_bytes()
-        tree = ast.parse(data)
+        tree = _parsed(data)
         imports, hashed = frozenset(_imports(tree, module)), _tree_hash(_Bare().visit(tree))
     except (OSError, SyntaxError, ValueError, RecursionError) as error:
         raise SourceNotFound(f"cannot read the source {module.file}: {error}") from error
@@ -217,6 +226,10 @@ def _edited(file: Path) -> str:
 
 class _Bare(ast.NodeTransformer):
     """Drop statements that are only text: docstrings, and the notes under an assignment."""
+
+    def visit(self, node: ast.AST) -> Any:  # noqa: ANN401 - what the other methods return
+        """Visit statements alone: no expression holds one, and expressions are most of a tree."""
+        return node if isinstance(node, ast.expr) else super().visit(node)
 
     def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
         """Drop the statement if it is a text, and look no deeper otherwise."""
@@ -247,12 +260,14 @@ def _named(base: str, name: str) -> Iterator[str]:
 
 def _running(tree: ast.AST) -> Iterator[ast.AST]:
     """Yield the nodes of a tree that may run: not what is there for type checkers alone."""
-    for node in ast.iter_child_nodes(tree):
+    waiting = list(ast.iter_child_nodes(tree))
+    while waiting:
+        node = waiting.pop()
         if _for_checkers(node):
-            yield from (each for part in node.orelse for each in (part, *_running(part)))
+            waiting += node.orelse
         else:
             yield node
-            yield from _running(node)
+            waiting += ast.iter_child_nodes(node)
 
 
 def _for_checkers(node: ast.AST) -> TypeGuard[ast.If]:
@@ -267,7 +282,7 @@ def _offered(package: str) -> Mapping[str, str]:
     if not located or not located.file or not located.folders:
         return {}
     try:
-        tree = ast.parse(located.file.read_bytes())
+        tree = _parsed(located.file.read_bytes())
     except (OSError, SyntaxError, ValueError):
         return {}  # reading the package itself says what is wrong
     blocks = (node.body for node in tree.body if _for_checkers(node))

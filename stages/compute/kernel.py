@@ -1,11 +1,11 @@
 """The one way this package compiles a loop."""
 
-import ast
 import hashlib
 import sys
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
+from types import CodeType
 from typing import TypeVar, cast
 
 import numba
@@ -53,24 +53,22 @@ def _digest(module: str) -> str:
 
 @cache
 def _source(module: str) -> tuple[bytes, tuple[str, ...]]:
-    """Return a module's source and the modules that it imports from."""
+    """Return a module's source, and those of the imported modules that it names.
+
+    The names are read off its compiled code. A syntax tree would be in danger: Python 3.11 fails now and then when two
+    threads make one at the same time, and stages are imported in several threads.
+    """
     file = sys.modules[module].__file__
     source = Path(file).read_bytes() if file else b""
-    return source, tuple(name for node in _statements(ast.parse(source)) for name in _imported(node))
+    names = set(_names(compile(source, file or "", "exec", dont_inherit=True)))
+    modules = names & sys.modules.keys()
+    inside = {f"{package}.{name}" for package in modules for name in names} & sys.modules.keys()
+    return source, (*modules, *inside)
 
 
-def _statements(tree: ast.AST) -> Iterator[ast.AST]:
-    """Yield all of a tree but its expressions, which import nothing and are most of it."""
-    for node in ast.iter_child_nodes(tree):
-        if not isinstance(node, ast.expr):
-            yield node
-            yield from _statements(node)
-
-
-def _imported(node: ast.AST) -> list[str]:
-    """Return the dotted names that a statement may import modules by; a name that is no module is harmless."""
-    if isinstance(node, ast.Import):
-        return [alias.name for alias in node.names]
-    if isinstance(node, ast.ImportFrom) and node.module:
-        return [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-    return []
+def _names(code: CodeType) -> Iterator[str]:
+    """Yield the names that a code uses, dotted ones as they are imported."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)

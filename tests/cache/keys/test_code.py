@@ -1,13 +1,17 @@
+import ast
+import gc
 import itertools
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from semidense.cache.errors import SourceNotFound
-from semidense.cache.keys.code import _locate, _parts, _read, code_parts
+from semidense.cache.keys.code import _locate, _parts, _read, code_parts, source_hash
 
 Tree = Callable[..., str]
 _numbers = itertools.count()
@@ -284,3 +288,18 @@ def test_what_runs_is_what_was_hashed(tmp_path: Path, acts: str, refused: int) -
     for line in said:
         assert line.startswith(f"refused {tmp_path / 'edited' / 'stage.py'} was edited since this Python began")
         assert line.endswith("restart Python (the kernel)")
+
+
+def test_threads_hash_at_the_same_time() -> None:
+    """Python 3.11 fails if one thread makes a syntax tree while another is interrupted in making one."""
+    text = Path(ast.__file__).read_text()
+
+    def interrupt(*_: object) -> None:
+        time.sleep(0)
+
+    gc.callbacks.append(interrupt)
+    try:
+        with ThreadPoolExecutor(2) as pool:
+            assert len(set(pool.map(source_hash, [text] * 8))) == 1
+    finally:
+        gc.callbacks.remove(interrupt)
