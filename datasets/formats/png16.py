@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 SCALE = 256
 """Steps to a pixel of disparity."""
+PNG_LEVEL = 2
+"""How hard zlib works on a PNG file. Pillow's own level, 6, takes three times as long for files 6 % smaller."""
 
 _LARGEST = np.iinfo(np.uint16).max
 
@@ -78,7 +80,7 @@ def write_png16(
         )
     stored = np.where(known, np.maximum(steps, 1), 0).astype(np.uint16)
     with atomic_write(path) as file:
-        Image.fromarray(stored).save(file, "PNG", pnginfo=_texts(about or {}))
+        Image.fromarray(stored).save(file, "PNG", pnginfo=_texts(about or {}), compress_level=PNG_LEVEL)
 
 
 def _texts(about: Mapping[str, str]) -> "PngInfo":

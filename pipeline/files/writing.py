@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from semidense.datasets.formats.atomic import atomic_write
+from semidense.datasets.formats.png16 import PNG_LEVEL
 from semidense.pipeline.plan.errors import UsageError
 
 if TYPE_CHECKING:  # an export of maps does without matplotlib's figures, which take a second to load
@@ -69,7 +70,7 @@ def write_rgb(rgb: NDArray[np.uint8] | NDArray[np.uint16], path: Path) -> None:
         UsageError: if the file cannot be written.
     """
     with explaining(path), atomic_write(path) as file:
-        Image.fromarray(rgb).save(file, "PNG")
+        Image.fromarray(rgb).save(file, "PNG", compress_level=PNG_LEVEL)
 
 
 def writable_folder(folder: Path) -> None:
