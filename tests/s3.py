@@ -1,7 +1,9 @@
 """A real S3 server on loopback, and a proxy before it that lets requests go wrong."""
 
+import html
 import os
 import random
+import re
 import socket
 import subprocess
 import sys
@@ -39,6 +41,10 @@ run_simple("127.0.0.1", int(sys.argv[1]), app, threaded=True, request_handler=Ha
 """
 KEYS = {"AWS_ACCESS_KEY_ID": "test", "AWS_SECRET_ACCESS_KEY": "test", "AWS_REGION": "us-east-1"}
 BUCKET = "bucket"
+CODES = {
+    "409": b"<Error><Code>ConditionalRequestConflict</Code></Error>",
+    "400": b"<Error><Code>RequestTimeout</Code></Error>",
+}
 
 
 def free_port() -> int:
@@ -49,11 +55,16 @@ def free_port() -> int:
 
 
 @contextmanager
-def s3_server() -> Iterator[int]:
-    """Start moto's server with a bucket; yield its port."""
+def s3_server(page: int = 7) -> Iterator[int]:
+    """Start moto's server with a bucket; yield its port.
+
+    Args:
+        page: names in one answer to a list. S3 gives 1,000, this server few, so that each list of a test has pages.
+    """
     port = free_port()
     command = [sys.executable, "-c", SERVER, str(port)]
-    server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    environment = {**os.environ, "MOTO_S3_DEFAULT_MAX_KEYS": str(page)}
+    server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
     try:
         _make_bucket(server, port)
         yield port
@@ -90,8 +101,10 @@ class Faults:
 
     Attributes:
         rate: part of the requests that go wrong.
-        kinds: what happens to these.
+        kinds: what happens to these; 409 and 400 are what S3 says when two conditional writes meet, and when a request
+            comes too slowly: they happen to PUT, and others get a 503 instead.
         slow: seconds that a slow answer takes.
+        late: seconds after its PUT in which an object is missing in lists.
         injected: how often each kind happened.
         requests: how many requests of each method came.
         up: bytes of their bodies.
@@ -99,8 +112,9 @@ class Faults:
     """
 
     rate: float = 0.0
-    kinds: tuple[str, ...] = ("500", "503", "dropped before", "lost answer", "slow")
+    kinds: tuple[str, ...] = ("500", "503", "409", "400", "dropped before", "lost answer", "slow")
     slow: float = 1.0
+    late: float = 0.0
     seed: int = 26
     injected: Counter[str] = field(default_factory=Counter)
     requests: Counter[str] = field(default_factory=Counter)
@@ -109,6 +123,7 @@ class Faults:
 
     def __post_init__(self) -> None:
         self._chance, self._lock = random.Random(self.seed), threading.Lock()
+        self._written: dict[str, float] = {}
 
     def draw(self, method: str, size: int) -> str:
         """Return what happens to a request; nothing for most."""
@@ -118,8 +133,27 @@ class Faults:
             if self._chance.random() >= self.rate:
                 return ""
             kind = self._chance.choice(self.kinds)
+            kind = kind if method == "PUT" or kind not in ("409", "400") else "503"
             self.injected[kind] += 1
             return kind
+
+    def wrote(self, path: str) -> None:
+        """Note that an object was written."""
+        self._written.setdefault(path, time.monotonic())
+
+    def listed(self, answer: bytes) -> bytes:
+        """Return a list without the objects that were written lately."""
+        late = {path for path, when in list(self._written.items()) if time.monotonic() - when < self.late}
+        early = set(self._written) - late
+
+        def unless_late(match: "re.Match[bytes]") -> bytes:
+            path = f"/{BUCKET}/{html.unescape(match[2].decode())}"
+            is_late = path in late or (path.endswith("/") and not any(each.startswith(path) for each in early))
+            return b"" if is_late else match[0]
+
+        kept = re.sub(rb"<(Contents|CommonPrefixes)>\s*<(?:Key|Prefix)>(.*?)<.*?</\1>", unless_late, answer, flags=re.S)
+        self.injected["late list"] += kept != answer
+        return kept
 
 
 @contextmanager
@@ -144,13 +178,17 @@ def proxy(port: int, faults: Faults) -> Iterator[int]:
         def _pass_on(self) -> None:
             body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
             kind = faults.draw(self.command, len(body))
-            if kind in ("500", "503"):
-                return self._answer(int(kind), {}, b"injected")
+            if kind.isdecimal():
+                return self._answer(int(kind), {}, CODES.get(kind, b"injected"))
             if kind == "dropped before":
                 return self._drop()
             if kind == "slow":
                 time.sleep(faults.slow)
             status, headers, data = self._ask(body)
+            if faults.late and self.command == "PUT":
+                faults.wrote(self.path)
+            if faults.late and "list-type=2" in self.path:
+                data = faults.listed(data)
             if kind == "lost answer":
                 return self._drop()
             faults.down += len(data)

@@ -15,7 +15,7 @@ from semidense.cache.keys.recipe import Recipe
 from semidense.cache.keys.sources import source_texts, verified_source
 from semidense.cache.layout import require_key
 from semidense.cache.objects import names, records
-from semidense.cache.objects.draft import ObjectDraft, hold
+from semidense.cache.objects.draft import ObjectDraft, hold, place_for
 from semidense.cache.objects.leases import alive, leased, uses
 from semidense.cache.objects.living import Living, owner_of, take
 from semidense.cache.objects.requests import Objects, connect
@@ -119,7 +119,7 @@ class ObjectBackend:
         """Return a draft below a prefix of its own, see ``Backend``."""
         self.create()
         name = (lease and lease.name) or names.new_lease()
-        place = names.place(name, recipe.key, maker)
+        place = place_for(self.objects, name, recipe.key, maker)
         if lease is None and (living := take(self.objects, alive(name))):
             hold(place, living)
         draft = ObjectDraft(recipe, label, time(), self.url, place)

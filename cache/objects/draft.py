@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from semidense.cache.entries.arrays import NAME, chunk_paths, new_array, require_dtype, require_fit, require_region
@@ -13,7 +14,7 @@ from semidense.cache.entries.backend import Draft
 from semidense.cache.entries.entry import DATA, MANIFEST, Entry, File, Manifest
 from semidense.cache.errors import DamagedEntry, EntryNotFound, IncompleteDraft, InvalidArray, InvalidKey
 from semidense.cache.files import in_threads
-from semidense.cache.objects import records
+from semidense.cache.objects import names, records
 from semidense.cache.objects.living import Living
 from semidense.cache.objects.near import near
 from semidense.cache.objects.requests import Found, Objects, connect
@@ -27,6 +28,16 @@ GIVEN_UP = b"given up\n"
 _HASH = "sha256"
 _own: dict[str, Living] = {}
 """Leases of drafts that belong to no run, by their place: held until the draft is published or deleted."""
+
+
+def place_for(objects: Objects, lease: str, key: str, maker: str) -> str:
+    """Return where a maker makes ``key``: the first of its places that no earlier attempt of the run gave up."""
+    places = (names.place(lease, key, maker, attempt) for attempt in count())
+    return next(each for each in places if not _is_given_up(objects.get(f"data/{each}/{MANIFEST}")))
+
+
+def _is_given_up(manifest: Found | None) -> bool:
+    return manifest is not None and manifest.data == GIVEN_UP
 
 
 def hold(place: str, lease: Living) -> None:
@@ -69,10 +80,10 @@ class ObjectDraft(Draft):
     ) -> None:
         """Add an empty array, see ``Draft``."""
         kind = require_dtype(name, dtype)
-        self._require_exists()
         require_fit(self.recipe.stage, self._sizes(), name, shape, chunks, dims)
         memory, place = _memory(name)
         new_array(place, shape, kind, chunks, dims, attrs, fill_value)
+        self._announce(name)
         self._put(f"{DATA}/zarr.json", _group())
         self._put(f"{DATA}/{name}/zarr.json", memory[f"{name}/zarr.json"].to_bytes())
 
@@ -113,8 +124,19 @@ class ObjectDraft(Draft):
             key, label = self.recipe.key, self.label
             entry = Entry(key, self.recipe, manifest.digest, label, now, float(seconds), manifest.size, extras)
             self._decide(manifest.to_bytes())
-            return records.publish(self._objects, records.Record(entry, self.place)).entry
-        finally:
+            record = records.publish(self._objects, records.Record(entry, self.place))
+        except BaseException:
+            self.discard()
+            raise
+        self._end(record)
+        return record.entry
+
+    def _end(self, record: records.Record) -> None:
+        """Forget the draft that became a record; delete one that came second."""
+        if record.place == self.place:
+            self._objects.delete([self._mark])
+            self._release()
+        else:
             self.discard()
 
     def _decide(self, manifest: bytes) -> None:
@@ -126,6 +148,9 @@ class ObjectDraft(Draft):
     def discard(self) -> None:
         """Delete the draft, see ``Draft``."""
         discard(self._objects, self.place)
+        self._release()
+
+    def _release(self) -> None:
         if own := _own.pop(self.place, None):
             own.release()
 
@@ -139,9 +164,19 @@ class ObjectDraft(Draft):
 
     def _require_exists(self) -> None:
         if not self.exists():
-            raise InvalidArray(
-                f"the draft of {self.recipe.stage} is gone: {self.place} in {self.url} was published or deleted"
-            )
+            raise self._gone()
+
+    def _gone(self) -> InvalidArray:
+        return InvalidArray(
+            f"the draft of {self.recipe.stage} is gone: {self.place} in {self.url} was published or deleted"
+        )
+
+    def _announce(self, name: str) -> None:
+        """Add an array to those that the mark names: whoever publishes must know them all, and a list may come late."""
+        while mark := self._objects.get(self._mark):
+            if name in _arrays_of(mark) or self._objects.replace(self._mark, mark.data + f"\n{name}".encode(), mark):
+                return
+        raise self._gone()
 
     def _put(self, path: str, data: bytes) -> None:
         """Create a file of the draft with its hash beside it; what another writer created first stays."""
@@ -153,19 +188,24 @@ class ObjectDraft(Draft):
         """Return what zarr wrote of an array; None if it was not created."""
         return _metadata(self.url, self._path(f"{DATA}/{name}/zarr.json"))
 
-    def _arrays(self) -> dict[str, dict[str, Any]]:
-        found = {name: self._about(name) for name in self._objects.names(self._path(DATA)) if name != "zarr.json"}
-        return {name: about for name, about in found.items() if about is not None}
+    def _arrays(self) -> list[str]:
+        """Return the names of all arrays; of one whose creator was killed, nothing may be there yet."""
+        if (mark := self._objects.get(self._mark)) is None:
+            raise self._gone()
+        return _arrays_of(mark)
 
     def _sizes(self) -> dict[str, dict[str, int]]:
         """Return the length of each dimension of each array that is there."""
+        found = {name: self._about(name) for name in self._arrays()}
         return {
             name: dict(zip(each.get("dimension_names", ()), each["shape"], strict=True))
-            for name, each in self._arrays().items()
+            for name, each in found.items()
+            if each is not None
         }
 
     def _chunks(self, name: str, region: tuple[slice, ...] | None = None) -> list[str]:
-        about = self._about(name) or {}
+        if (about := self._about(name)) is None:
+            return []
         chunks = chunk_paths(about["shape"], about["chunk_grid"]["configuration"]["chunk_shape"], region)
         return [f"{DATA}/{name}/{path}" for path in chunks]
 
@@ -195,7 +235,7 @@ class ObjectDraft(Draft):
 
     def _whole(self, found: Mapping[str, Found | None]) -> Iterable[tuple[str, Found]]:
         """Return the files in order; refuse to publish a draft that lacks some."""
-        missing = [path for path, each in found.items() if each is None]
+        missing = [path for path, each in found.items() if each is None or _HASH not in each.attributes]
         if missing:
             raise IncompleteDraft(
                 f"the draft of {self.recipe.stage} lacks {len(missing)} of {len(found)} files, first {missing[0]}: "
@@ -213,12 +253,21 @@ def discard(objects: Objects, place: str) -> None:
     mark = objects.get(f"drafts/{place}")
     if mark is None:
         return
-    data = [each.path for each in objects.below(f"data/{place}") if not each.path.endswith(f"/{MANIFEST}")]
-    if objects.create(f"data/{place}/{MANIFEST}", GIVEN_UP) is None:
-        objects.delete(data)  # the mark in place of the manifest stays until a cleaning: a writer may be late
-    elif _lost(objects, mark.data.decode("ascii", "replace"), place):
-        objects.delete([*data, f"data/{place}/{MANIFEST}"])
+    manifest = f"data/{place}/{MANIFEST}"
+    if objects.create(manifest, GIVEN_UP) is None:  # it stays there until a cleaning: a writer may be late
+        objects.delete(each.path for each in objects.below(f"data/{place}") if each.path != manifest)
+    elif _lost(objects, _words(mark)[0], place):
+        objects.delete(each.path for each in objects.below(f"data/{place}"))
     objects.delete([f"drafts/{place}"])
+
+
+def _words(mark: Found) -> list[str]:
+    """Return what a draft's mark says: the key, and then the name of each array."""
+    return mark.data.decode("ascii", "replace").split() or [""]
+
+
+def _arrays_of(mark: Found) -> list[str]:
+    return _words(mark)[1:]
 
 
 def _lost(objects: Objects, key: str, place: str) -> bool:

@@ -90,12 +90,14 @@ class Uses:
 
     Attributes:
         living: names of the leases of living runs.
+        dead: the objects that said that a run was alive, of runs that were killed.
         keys: keys on the lists of these.
         used: when a run last used a key, by the store's clock, in seconds since the epoch.
         lists: the objects of lists by the name of their lease, and the keys on each.
     """
 
     living: frozenset[str]
+    dead: tuple[Listed, ...]
     keys: frozenset[str]
     used: Callable[[str], float]
     lists: tuple[tuple[Listed, frozenset[str]], ...]
@@ -105,14 +107,16 @@ def uses(objects: Objects) -> Uses:
     """Return what all leases say, those of runs that are gone too."""
     listed = list(objects.below("leases"))
     now = objects.now()
-    living = {_lease(each) for each in listed if each.path.endswith("/alive") and now - each.modified < EXPIRY}
+    signs = [each for each in listed if each.path.endswith("/alive")]
+    dead = tuple(each for each in signs if now - each.modified >= EXPIRY)
+    living = {_lease(each) for each in signs if each not in dead}
     found = [each for each in listed if "/keys/" in each.path]
     lists = tuple(zip(found, in_threads(lambda each: _keys(objects, each), found), strict=True))
     times: dict[str, float] = {}
     for each, keys in lists:
         times.update((key, each.modified) for key in keys if times.get(key, 0.0) < each.modified)
     in_use = frozenset(key for each, keys in lists if _lease(each) in living for key in keys)
-    return Uses(frozenset(living), in_use, lambda key: times.get(key, 0.0), lists)
+    return Uses(frozenset(living), dead, in_use, lambda key: times.get(key, 0.0), lists)
 
 
 def _lease(listed: Listed) -> str:

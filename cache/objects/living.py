@@ -29,13 +29,15 @@ class Living:
         self.path = path
         self._objects = objects
         self._content = {**content, "owner": owner(), "token": secrets.token_hex(8)}
+        self._lock = threading.Lock()
 
     def renew(self) -> bool:
         """Write the object again; return False if it is no longer this process's own."""
-        found = self._objects.get(self.path)
-        if found is None or content_of(found).get("token") != self._content["token"]:
-            return False
-        return self._objects.replace(self.path, self.to_bytes(), found)
+        with self._lock:  # of two threads that renew at a time, one would take the other for somebody else
+            found = self._objects.get(self.path)
+            if found is None or content_of(found).get("token") != self._content["token"]:
+                return False
+            return self._objects.replace(self.path, self.to_bytes(), found)
 
     def release(self) -> None:
         """Delete the object, if it is still this process's own: let the next one have its name."""

@@ -23,9 +23,9 @@ def key_of_record(path: str) -> str | None:
     return match[2] if match else None
 
 
-def place(lease: str, key: str, maker: str) -> str:
-    """Return where a maker makes ``key`` for the run that holds a lease: always the same place."""
-    return f"{lease}/{hashlib.sha256(f'{require_key(key)} {maker}'.encode()).hexdigest()}"
+def place(lease: str, key: str, maker: str, attempt: int = 0) -> str:
+    """Return where a maker makes ``key`` for the run that holds a lease: the same place in all processes of the run."""
+    return f"{lease}/{hashlib.sha256(f'{require_key(key)} {attempt} {maker}'.encode()).hexdigest()}"
 
 
 def is_place(text: object) -> bool:

@@ -11,10 +11,11 @@ from typing import Any, TypeVar
 from uuid import uuid4
 
 from semidense.cache.errors import CacheUnavailable
+from semidense.cache.objects.clock import Clock
 
 T = TypeVar("T")
 PATIENCE = 60.0
-"""Seconds for which a request is sent again before the store is said not to answer."""
+"""Seconds, from its first failure, for which a request is sent again before the store is said not to answer."""
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 """Seconds between two tries: the pause doubles, and a random part keeps clients apart."""
 TIMEOUT, CONNECT_TIMEOUT = "60s", "5s"
@@ -24,6 +25,8 @@ _ADVICE = (
 )
 _MEMORY = "memory://"
 _FINAL = ("builder error", *(f"status code: {code}" for code in (301, 307, 400, 401, 403, 404, 405)))
+_PASSING = "<Code>RequestTimeout</Code>"
+"""What S3 says, under the code 400, when a request came too slowly: sent again, it may come in time."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,8 @@ def _new(url: str) -> "Objects":
         raise CacheUnavailable(
             f"a cache at {url} needs the package obstore: pip install 'semidense-stereo[cloud]'"
         ) from None
+    if "?" in url or "#" in url or {".", ".."} & set(url.split("/")):
+        raise CacheUnavailable(f"{url} is no place for a cache: choose a prefix without ?, # and parts that are dots")
     try:
         if url.startswith(_MEMORY):
             return Objects(url, obstore.store.MemoryStore())
@@ -96,7 +101,7 @@ class Objects:
         self.url = url
         self._store = store
         self.is_cache = False
-        self._skew: float | None = None
+        self._clock: Clock | None = None
 
     def get(self, path: str) -> Found | None:
         """Return an object, None if there is none."""
@@ -111,13 +116,13 @@ class Objects:
         from obstore.exceptions import AlreadyExistsError
 
         def attempt() -> Found | None:
-            while True:
-                try:
-                    self._put(path, data, "create", attributes)
-                    return None
-                except AlreadyExistsError:
-                    if found := self.get(path):  # else it went since: write it after all
-                        return None if found.data == data else found
+            try:
+                self._put(path, data, "create", attributes)
+                return None
+            except AlreadyExistsError:
+                if found := self.get(path):
+                    return None if found.data == data else found
+                raise  # it went since, or two writers met: write it after all
 
         return self._answered(attempt, "write to")
 
@@ -167,10 +172,13 @@ class Objects:
         return self._answered(attempt, "read")
 
     def now(self) -> float:
-        """Return the time by the store's clock, in seconds since the epoch; it is asked for it once."""
-        if self._skew is None:
-            self.require_conditions()
-        return time.time() + (self._skew or 0.0)
+        """Return the time by the store's clock, in seconds since the epoch, or a little less.
+
+        It is read once, and counted on from there; read again if this machine slept, or its own clock was set. An
+        object then never looks older than it is: nobody who is alive is taken for dead.
+        """
+        clock = self._clock
+        return (clock if clock and clock.is_right() else self._probe()).now()
 
     def require_conditions(self) -> None:
         """Refuse a store that ignores conditional writes; they keep two writers apart.
@@ -178,11 +186,15 @@ class Objects:
         Raises:
             CacheUnavailable: if it does, or cannot be written.
         """
-        if self._skew is not None:
-            return
+        if self._clock is None:
+            self._probe()
+
+    def _probe(self) -> Clock:
+        """Try conditional writes on an object that is deleted afterwards; return the clock that its time tells."""
         path, first, second = f"probe/{uuid4().hex}", uuid4().bytes, uuid4().bytes
         self.create(path, first)
         found = self.head(path)
+        clock = Clock.read(found.modified if found else 0.0)
         try:
             if not found or self.create(path, second) is None or not self._replaces_only_its_version(path, second):
                 raise CacheUnavailable(
@@ -191,7 +203,8 @@ class Objects:
                 )
         finally:
             self.delete([path])
-        self._skew = found.modified - time.time()
+        self._clock = clock
+        return clock
 
     def _replaces_only_its_version(self, path: str, data: bytes) -> bool:
         old = self.get(path)
@@ -227,13 +240,14 @@ class Objects:
         from obstore.exceptions import BaseError
 
         self._require_own_process()
-        deadline, pause = time.monotonic() + PATIENCE, FIRST_PAUSE
+        deadline, pause = None, FIRST_PAUSE
         while True:
             try:
                 return attempt()
             except (BaseError, OSError) as error:
                 if isinstance(error, CacheUnavailable):
                     raise
+                deadline = deadline or time.monotonic() + PATIENCE  # a first try may have waited for its whole timeout
                 if _is_final(error) or time.monotonic() + pause > deadline:
                     line = f"cannot {action} the cache at {self.url}: {_first_line(error)}; {_ADVICE}"
                     raise CacheUnavailable(line) from None
@@ -250,9 +264,11 @@ def _absent_is_fine(delete: Callable[[], object]) -> None:
 
 def _is_final(error: Exception) -> bool:
     """Return whether asking again would get the same answer."""
-    from obstore.exceptions import GenericError, JoinError
+    from obstore.exceptions import AlreadyExistsError, GenericError, JoinError
 
-    return not isinstance(error, (GenericError, JoinError)) or any(each in str(error) for each in _FINAL)
+    passing = (AlreadyExistsError, GenericError, JoinError)  # the first is a 409: two conditional writes met
+    refused = any(each in str(error) for each in _FINAL) and _PASSING not in str(error)
+    return refused or not isinstance(error, passing)
 
 
 def _found(result: Any, data: bytes) -> Found:  # noqa: ANN401

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 from semidense.cache.entries.entry import Entry
-from semidense.cache.errors import CacheUnavailable, DamagedEntry, EntryNotFound
+from semidense.cache.errors import CacheUnavailable, DamagedEntry
 from semidense.cache.files import in_threads
 from semidense.cache.objects import names, records
 from semidense.cache.objects.draft import discard
@@ -76,17 +76,15 @@ def _places(objects: Objects) -> dict[str, _Place]:
 
 def _sort(found: _View, key: str, listed: Listed, data: bytes) -> None:
     """Note what a record says."""
-    try:
-        record = records.parse(key, data)
-        found.entries[key], found.made[key] = record.entry, listed.modified
-        found.referred.add(record.place)
-    except EntryNotFound:
-        aside = records.parse_aside(data)
-        if aside:
-            found.asides[key] = aside
-            found.referred.add(aside.place)
-    except DamagedEntry:
+    there = _read(key, data)
+    if isinstance(there, DamagedEntry):
         found.damaged.append(listed)
+        return
+    found.referred.add(there.place)
+    if isinstance(there, records.Aside):
+        found.asides[key] = there
+    else:
+        found.entries[key], found.made[key] = there.entry, listed.modified
 
 
 def survey(objects: Objects, limits: Limits) -> Survey:
@@ -134,10 +132,13 @@ def _lease(place: str) -> str:
 
 
 def _stale(found: _View) -> Iterator[Item]:
-    """Yield claims of dead processes, and the lists of dead runs on which nothing is that is still there."""
-    for each in found.objects.below("claims"):
-        if found.now - each.modified > EXPIRY:
-            yield _item("stale lock", each.path, "its process is gone", each.size)
+    """Yield signs of life of dead processes, and the lists of dead runs on which nothing is that is still there."""
+    claims = (each for each in found.objects.below("claims") if found.now - each.modified > EXPIRY)
+    for each in (*claims, *found.uses.dead):
+        yield _item("stale lock", each.path, "its process is gone", each.size)
+    for each in found.objects.below("probe"):
+        if found.now - each.modified > ORPHAN_SECONDS:
+            yield _item("stale lock", each.path, "its process was killed while it tried the store", each.size)
     for each, keys in found.uses.lists:
         if each.path.split("/")[1] not in found.uses.living and not keys & found.entries.keys():
             yield _item("stale lock", each.path, "its run is gone, and so is what it used", each.size)
@@ -145,59 +146,83 @@ def _stale(found: _View) -> Iterator[Item]:
 
 def collect(objects: Objects, items: Collection[Item]) -> tuple[Item, ...]:
     """Delete what ``survey`` found, except what a run has begun to use since. See ``gc.collect``."""
-    cleaning = take(objects, names.CLEANING, {"keys": sorted(item.name for item in items if item.kind == "entry")})
+    cleaning = take(objects, names.CLEANING, {"keys": sorted(item.name for item in items if item.kind in _RECORDS)})
     if cleaning is None:
         raise CacheUnavailable(f"somebody else is cleaning {objects.url}: wait until that is done")
     try:
-        used = uses(objects).keys
-        return tuple(_deleted(objects, cleaning, [item for item in items if item.name not in used]))
+        used = uses(objects)
+        free = [item for item in items if item.name not in used.keys and not _is_of_living(item, used)]
+        return tuple(_deleted(objects, cleaning, free))
     finally:
         cleaning.release()
 
 
+_RECORDS: dict[Kind, type] = {"entry": records.Record, "quarantine": records.Aside, "damaged record": DamagedEntry}
+"""The kinds of items that are records, and what the object of each is."""
+
+
+def _is_of_living(item: Item, used: Uses) -> bool:
+    """Return whether a draft, an orphan or a list belongs to a run that came back to life since the survey."""
+    lease = item.name.split("/")[1] if item.name.startswith("leases/") else _lease(item.name)
+    return item.kind not in _RECORDS and lease in used.living
+
+
 def _deleted(objects: Objects, cleaning: Living, items: Collection[Item]) -> Iterator[Item]:
-    """Delete things one by one, as long as the mark of the cleaning is known to be alive; yield each."""
+    """Delete things one by one, as long as the mark of the cleaning is known to be alive; yield each that was there."""
     renewed = time.monotonic()
     for item in items:
         if time.monotonic() - renewed > BEAT:
             if not cleaning.renew():
                 raise CacheUnavailable(f"this cleaning of {objects.url} was taken for dead: clean again")
             renewed = time.monotonic()
-        _delete(objects, item)
-        yield item
+        if _delete(objects, item):
+            yield item
 
 
-def _delete(objects: Objects, item: Item) -> None:
+def _delete(objects: Objects, item: Item) -> bool:
+    """Delete a thing; return whether it still was what the survey found."""
+    if item.kind in _RECORDS:
+        return _delete_record(objects, item.name, _RECORDS[item.kind])
     if item.kind == "draft":
         discard(objects, item.name)
     elif item.kind == "orphan":
         _delete_data(objects, item.name)
     elif item.kind == "checkpoint":
         objects.delete([f"checkpoints/{item.name}"])
-    elif item.kind == "stale lock":
-        objects.delete([item.name])
+    elif item.name.startswith("claims/") or item.name.endswith("/alive"):
+        return _delete_sign(objects, item.name)
     else:
-        _delete_record(objects, item.name)
+        objects.delete([item.name])
+    return True
 
 
-def _delete_record(objects: Objects, key: str) -> None:
+def _delete_sign(objects: Objects, path: str) -> bool:
+    """Delete the sign of life of a dead process; leave it if somebody has taken it over, or lives after all."""
+    taken = take(objects, path)
+    if taken:
+        taken.release()
+    return taken is not None
+
+
+def _delete_record(objects: Objects, key: str, kind: type) -> bool:
     """Delete a record, then its data: killed in between, this leaves data without a record, which nobody sees."""
     found = objects.get(names.record(key))
-    if found is None:
-        return
-    place = _place_of(key, found.data)
+    if found is None or not isinstance(there := _read(key, found.data), kind):
+        return False
     objects.delete([names.record(key)])
+    place = getattr(there, "place", "")
     if names.is_place(place):
         _delete_data(objects, place)
+    return True
 
 
-def _place_of(key: str, data: bytes) -> str:
+def _read(key: str, data: bytes) -> records.Record | records.Aside | DamagedEntry:
+    """Return what the object of a record is: a record, what stands in place of one, or why it cannot be read."""
     try:
-        return records.parse(key, data).place
-    except (EntryNotFound, DamagedEntry):
-        aside = records.parse_aside(data)
-        return aside.place if aside else ""
+        return records.parse_aside(data) or records.parse(key, data)
+    except DamagedEntry as error:
+        return error
 
 
 def _delete_data(objects: Objects, place: str) -> None:
-    objects.delete([each.path for each in objects.below(f"data/{place}")])
+    objects.delete(each.path for each in objects.below(f"data/{place}"))

@@ -117,8 +117,12 @@ def test_a_draft_of_a_dead_run_goes_and_a_living_ones_stays(
     assert kinds(memory) == []
     later(monkeypatch, living.EXPIRY + 1)
     found = survey(memory, Limits()).items
-    assert [item.kind for item in found] == ["draft"]
-    collect(memory, found)
+    assert [(item.kind, item.reason) for item in found] == [
+        ("draft", "its run is gone"),
+        ("stale lock", "its process is gone"),
+    ]
+    assert collect(memory, found) == found
+    assert list(objects_of(memory).below("leases")) == []
     assert kinds(memory) == [], "what stands in place of the manifest stays for a day: a writer may be late"
     later(monkeypatch, objects_gc.ORPHAN_SECONDS + 1)
     found = survey(memory, Limits()).items
@@ -158,3 +162,50 @@ def test_quarantine_and_damaged_records_go(memory: Store, make: Make, monkeypatc
     assert sorted(item.kind for item in found) == ["damaged record", "quarantine"]
     collect(memory, found)
     assert list(objects_of(memory).below("records")) == []
+
+
+def test_what_a_run_that_came_back_to_life_is_making_stays(
+    memory: Store, recipe: Recipe, filled: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draft = memory.begin(recipe, {})
+    filled(draft)
+    with monkeypatch.context() as patch:
+        later(patch, living.EXPIRY + 1)
+        found = survey(memory, Limits()).items
+    assert len(found) == 2
+    assert collect(memory, found) == ()
+    assert draft.publish(1.5, {}) == memory.find(recipe.key)
+
+
+def test_an_entry_that_was_made_again_since_the_survey_stays(memory: Store, make: Make) -> None:
+    entry = make(memory)
+    sound = objects_of(memory).get(names.record(entry.key))
+    objects_of(memory).put(names.record(entry.key), b"{}")
+    found = survey(memory, Limits()).items
+    assert [item.kind for item in found] == ["damaged record"]
+    assert sound
+    objects_of(memory).put(names.record(entry.key), sound.data)
+    assert collect(memory, found) == ()
+    assert memory.require(entry.key) == entry
+
+
+def test_a_run_waits_while_a_damaged_record_that_it_will_replace_is_deleted(memory: Store, make: Make) -> None:
+    entry = make(memory)
+    objects_of(memory).put(names.record(entry.key), b"{}")
+    found = survey(memory, Limits()).items
+    with memory.lease() as lease:
+        lease.add([entry.key])
+        assert collect(memory, found) == (), "the run is about to replace it"
+
+
+def test_a_try_of_the_store_that_was_killed_goes_after_a_day(
+    memory: Store, make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make(memory)
+    objects_of(memory).put("probe/1f", b"")
+    assert kinds(memory) == []
+    later(monkeypatch, objects_gc.ORPHAN_SECONDS + 1)
+    found = survey(memory, Limits()).items
+    assert [item.name for item in found] == ["probe/1f"]
+    collect(memory, found)
+    assert list(objects_of(memory).below("probe")) == []

@@ -1,9 +1,11 @@
 """Requests that go wrong, and stores that cannot be used."""
 
+import time
 from collections.abc import Callable
 from typing import Any
 
 import pytest
+from obstore.exceptions import GenericError
 
 from semidense.cache import CacheUnavailable, Store
 from semidense.cache.objects import requests
@@ -80,3 +82,49 @@ assert code(in_child(look)) == 0
     )
     assert told.startswith("a forked process cannot use the cache at memory://forked: start it by spawn")
     assert "\n" not in told.rstrip()
+
+
+def test_the_patience_for_a_store_begins_with_the_first_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(requests, "PATIENCE", 0.3)
+    tries: list[float] = []
+
+    def hangs_once() -> str:
+        tries.append(0.0)
+        if len(tries) == 1:
+            time.sleep(0.5)
+            raise GenericError("operation timed out")
+        return "answered"
+
+    assert connect("memory://patient")._answered(hangs_once, "read") == "answered"
+
+
+@pytest.mark.parametrize("prefix", ["a?b=c", "a#b", "a/../b", "./a", ".."])
+def test_a_prefix_that_would_become_another_one_is_refused(prefix: str) -> None:
+    with pytest.raises(CacheUnavailable, match="choose a prefix without"):
+        connect(f"s3://bucket/{prefix}")
+
+
+def test_caches_side_by_side_do_not_see_each_other(s3_port: int, make: Callable[..., Any]) -> None:
+    with pointed_at(s3_port) as url:
+        names = ["a", "a2", "a b", "a+b", "a&b", "a=b", "a*b", "a:b", "\u00fc/\u4e2d", "~"]
+        for number, name in enumerate(names):
+            make(Store(f"{url}/{name}"), n=number)
+        for number, name in enumerate(names):
+            (entry,) = Store(f"{url}/{name}").entries()
+            assert entry.recipe.params == {"n": number}
+        with pytest.raises(CacheUnavailable, match="is not a cache: it holds"):
+            make(Store(url))
+
+
+def test_lists_and_deletes_of_many_objects_are_whole(s3_port: int) -> None:
+    with pointed_at(s3_port) as url:
+        objects = connect(url)
+        paths = [f"a/{number:02d}" for number in range(40)]  # six pages of the server's
+        for path in paths:
+            objects.put(path, b"")
+            objects.put(path.replace("a/", "a2/"), b"")
+        assert [each.path for each in objects.below("a")] == paths
+        assert objects.names("a") == [path.removeprefix("a/") for path in paths]
+        assert objects.names() == ["a", "a2"]
+        objects.delete([*paths, *(f"a/none{number}" for number in range(1000))])  # a request deletes 1,000 at most
+        assert objects.names() == ["a2"]

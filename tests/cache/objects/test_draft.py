@@ -1,0 +1,86 @@
+"""Drafts in an object store: what one says does not depend on lists, and what was given up stays given up."""
+
+from collections.abc import Callable
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from semidense.cache import IncompleteDraft, InvalidArray, Recipe, Store
+from semidense.cache.objects.requests import Listed, Objects, connect
+from tests.s3 import Faults, pointed_at, proxy
+
+Filled = Callable[..., None]
+
+
+def test_a_list_that_comes_late_leaves_no_array_out(s3_port: int, recipe: Recipe, filled: Filled) -> None:
+    faults = Faults(late=60.0)
+    with proxy(s3_port, faults) as port, pointed_at(port) as url:
+        store = Store(url)
+        draft = store.begin(recipe, {})
+        filled(draft)
+        draft.create_array("level", (1,), "int32", (1,), ("one",), {})
+        draft.write("level", (slice(0, 1),), np.array([7], np.int32))
+        assert connect(url).names(f"data/{draft.place}/data.zarr") == [], "the list lacks objects"  # type: ignore[attr-defined]
+        draft.publish(1.5, {})
+        assert sorted(store.read(recipe.key)) == ["level", "map"]
+        assert store.read(recipe.key)["level"].tolist() == [7]
+
+
+def test_an_array_whose_creator_was_killed_is_created_again_and_else_not_published(
+    memory: Store, recipe: Recipe, filled: Filled
+) -> None:
+    draft = memory.begin(recipe, {})
+    filled(draft)
+    draft._announce("level")  # type: ignore[attr-defined]
+    assert not draft.has_array("level")
+    with pytest.raises(IncompleteDraft, match=r"lacks 1 of 5 files, first data.zarr/level/zarr.json"):
+        draft.publish(1.5, {})
+    draft = memory.begin(recipe, {})
+    filled(draft)
+    draft._announce("level")  # type: ignore[attr-defined]
+    draft.create_array("level", (1,), "int32", (1,), ("one",), {})
+    draft.write("level", (slice(0, 1),), np.array([7], np.int32))
+    draft.publish(1.5, {})
+    assert memory.read(recipe.key)["level"].tolist() == [7]
+
+
+def test_a_second_attempt_of_a_run_makes_what_the_first_gave_up(memory: Store, recipe: Recipe, filled: Filled) -> None:
+    with memory.lease() as lease:
+        first = memory.begin(recipe, {}, lease, "step")
+        filled(first)
+        lease.discard_drafts()
+        second, other = (memory.begin(recipe, {}, lease, "step") for _ in range(2))
+        assert second == other.__class__(other.recipe, other.label, second.started, other.url, other.place)  # type: ignore[attr-defined,call-arg]
+        with pytest.raises(InvalidArray, match="gone"):
+            first.write("map", (slice(0, 2), slice(0, 3)), np.zeros((2, 3), np.float32))
+        filled(second)
+        entry = second.publish(1.5, {})
+        assert other.published() == entry == memory.find(recipe.key)
+
+
+def test_what_a_late_writer_leaves_of_a_draft_that_was_given_up_is_never_published(
+    memory: Store, recipe: Recipe, filled: Filled, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draft = memory.begin(recipe, {})
+    filled(draft)
+    real = Objects.below
+    with monkeypatch.context() as patch:
+        patch.setattr(Objects, "below", lambda self, prefix: islice(real(self, prefix), 1))
+        draft.discard()
+    assert _below(memory, "data"), "the list was short"
+    with pytest.raises(InvalidArray, match="gone"):
+        draft.publish(1.5, {})
+    assert memory.find(recipe.key) is None
+
+
+def test_an_object_that_somebody_else_wrote_is_no_chunk(memory: Store, recipe: Recipe, filled: Filled) -> None:
+    draft = memory.begin(recipe, {})
+    filled(draft)
+    connect(str(memory.root)).put(f"data/{draft.place}/data.zarr/map/c/0/0", b"x")  # type: ignore[attr-defined]
+    with pytest.raises(IncompleteDraft, match=r"lacks 1 of 4 files, first data.zarr/map/c/0/0"):
+        draft.publish(1.5, {})
+
+
+def _below(store: Store, prefix: str) -> list[Listed]:
+    return list(connect(str(store.root)).below(prefix))
