@@ -1,7 +1,7 @@
 """The cache as its users see it: find, require, open, begin."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +12,7 @@ from semidense.cache.entries.backend import Backend, Checkpoint, Claim, Draft, L
 from semidense.cache.entries.entry import Entry
 from semidense.cache.entries.folder import FolderBackend
 from semidense.cache.errors import CacheUnavailable, DamagedEntry, EntryNotFound
+from semidense.cache.files import in_threads
 from semidense.cache.keys.recipe import Recipe, require_texts
 from semidense.cache.layout import Layout
 
@@ -109,13 +110,13 @@ class Store:
             return str(error)
         return None
 
-    def has(self, key: str) -> bool:
-        """Return whether there is a record of ``key``; reads nothing.
+    def has_all(self, keys: Iterable[str]) -> bool:
+        """Return whether there is a record of each of these keys; reads nothing, and asks for several at a time.
 
         Raises:
-            InvalidKey: if ``key`` is not one.
+            InvalidKey: if one is not a key.
         """
-        return self.backend.has(key)
+        return all(in_threads(self.backend.has, keys))
 
     def look(self, key: str) -> tuple[Entry | None, str | None]:
         """Return what ``find`` does, and of an entry that is there what ``check`` does; its record is read once.
@@ -131,6 +132,10 @@ class Store:
         except DamagedEntry as error:
             return entry, str(error)
         return entry, None
+
+    def look_all(self, keys: Iterable[str]) -> list[tuple[Entry | None, str | None]]:
+        """Return what ``look`` does for each of these keys, in order; several are looked at at a time."""
+        return in_threads(self.look, keys)
 
     def require(self, key: str) -> Entry:
         """Return the entry of ``key``, checked as the policy says; a damaged one is moved to quarantine.
@@ -216,7 +221,7 @@ class Store:
             CacheUnavailable: if the folder is not a cache, or the file system refuses.
         """
         self.backend.require_cache()
-        return (entry for key in self.backend.record_keys() if (entry := self.find(key)))
+        return (entry for entry in in_threads(self.find, self.backend.record_keys()) if entry)
 
     def history(self, label: Mapping[str, str]) -> list[Entry]:
         """Return the entries of exactly this label, newest first."""

@@ -83,13 +83,18 @@ def _make_bucket(server: "subprocess.Popen[bytes]", port: int) -> None:
     raise RuntimeError("the S3 server does not start")
 
 
+def fresh_url() -> str:
+    """Return the URL of a cache that is not there yet."""
+    return f"s3://{BUCKET}/{uuid4().hex}"
+
+
 @contextmanager
 def pointed_at(port: int) -> Iterator[str]:
     """Have this process and its children use the server at a port; yield the URL of a fresh cache."""
     before = dict(os.environ)
     os.environ.update({**KEYS, "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}"})
     try:
-        yield f"s3://{BUCKET}/{uuid4().hex}"
+        yield fresh_url()
     finally:
         os.environ.clear()
         os.environ.update(before)

@@ -80,10 +80,13 @@ class ObjectBackend:
         from semidense.cache.objects.reader import fetch
 
         record = records.read(self.objects, key)
-        in_threads(
-            lambda file: fetch(self.objects, record, file, kept=False),
-            records.read_manifest(self.objects, record).files,
-        )
+        try:
+            files = records.read_manifest(self.objects, record).files
+            in_threads(lambda file: fetch(self.objects, record, file, kept=False), files)
+        except DamagedEntry:
+            if records.read(self.objects, key) == record:
+                raise
+            return self.verify(key)  # it was deleted, or made again, meanwhile
         return record.entry
 
     def set_aside(self, key: str, policy: Policy) -> None:

@@ -63,6 +63,6 @@ def _kept(plan: Plan, planned: Callable[[], Plan], store: Store, lease: Lease) -
     while True:
         hits: Sequence[str] = [str(each.key) for each in plan.steps if each.state == "hit"]
         lease.add(hits)
-        if all(map(store.has, hits)):  # cleaning takes the record away first
+        if store.has_all(hits):  # cleaning takes the record away first
             return plan
         plan = planned()

@@ -6,7 +6,7 @@ keys are open: such a step will be made too, unless what is above it comes out u
 a hit, and saved).
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -116,8 +116,17 @@ def make_plan(request: Request, store: Store, forced: Iterable[str] = ()) -> Pla
 def plan_graph(graph: Graph, store: Store, forced: Iterable[str] = ()) -> Plan:
     """Return the plan of steps that are known already; as ``make_plan`` otherwise."""
     planner = _Planner(store, frozenset(forced))
-    planned = tuple(planner.look_at(step) for step in graph.steps.values())
+    planned = planner.look_at_all(tuple(graph.steps.values()))
     return Plan(planned, tuple(graph.targets), tuple(graph.notes), planner.forced)
+
+
+def _levels(steps: Sequence[Step]) -> Iterator[list[Step]]:
+    """Yield the steps in groups: each needs only what is in groups before its own."""
+    level: dict[str, int] = {}
+    for step in steps:
+        level[step.id] = 1 + max((level[each] for ids in step.inputs.values() for each in ids), default=-1)
+    for number in sorted(set(level.values())):
+        yield [step for step in steps if level[step.id] == number]
 
 
 class _Planner:
@@ -131,15 +140,26 @@ class _Planner:
         self._reasons: Causes | None = None
         self._causes: dict[str, tuple[str, ...]] = {}
 
-    def look_at(self, step: Step) -> Planned:
-        """Return the step with its state."""
-        open_inputs = {
-            product: ids for product, ids in step.inputs.items() if not all(each in self.digests for each in ids)
-        }
-        if open_inputs:
-            return self._not_there(step, None, self._pending(step, open_inputs))
-        recipe = step.recipe(self.digests)
-        entry, damage = self.store.look(recipe.key)
+    def look_at_all(self, steps: Sequence[Step]) -> tuple[Planned, ...]:
+        """Return the steps with their states; those that do not need one another are looked up at the same time."""
+        found: dict[str, Planned] = {}
+        for level in _levels(steps):
+            recipes = {step.id: step.recipe(self.digests) for step in level if not self._open_inputs(step)}
+            looks = self.store.look_all(recipe.key for recipe in recipes.values())
+            seen = dict(zip(recipes, looks, strict=True))
+            found.update((step.id, self._state(step, recipes.get(step.id), *seen.get(step.id, ()))) for step in level)
+        return tuple(found[step.id] for step in steps)
+
+    def _open_inputs(self, step: Step) -> dict[str, tuple[str, ...]]:
+        """Return the inputs of which one is still to be made."""
+        return {product: ids for product, ids in step.inputs.items() if not all(each in self.digests for each in ids)}
+
+    def _state(
+        self, step: Step, recipe: Recipe | None, entry: Entry | None = None, damage: str | None = None
+    ) -> Planned:
+        """Return the step with its state, given what the cache has for its recipe; none: its inputs are open."""
+        if recipe is None:
+            return self._not_there(step, None, self._pending(step, self._open_inputs(step)))
         if entry is None or damage or step.product in self.forced:
             changes = (Change("forced", ABSENT, step.product),) if entry and not damage else None
             return self._not_there(step, recipe, changes or self._changes(step, recipe), damage)

@@ -24,7 +24,7 @@ from semidense.cache.files import walk
 def test_an_empty_cache_answers_and_makes_nothing(store: Store, recipe: Recipe) -> None:
     assert store.find(recipe.key) is None
     assert store.look(recipe.key) == (None, None)
-    assert not store.has(recipe.key)
+    assert not store.has_all([recipe.key])
     assert "no entry has the key" in str(store.check(recipe.key))
     assert list(store.entries()) == []
     assert store.history({}) == []
@@ -39,7 +39,8 @@ def test_what_was_published_is_found(store: Store, make: Callable[..., Entry], r
     assert store.find(recipe.key) == store.require(recipe.key) == entry
     assert store.check(recipe.key) is None
     assert store.look(recipe.key) == (entry, None)
-    assert store.has(recipe.key)
+    assert store.has_all([recipe.key])
+    assert store.look_all([recipe.key, "0" * 64]) == [(store.find(recipe.key), None), (None, None)]
     assert (entry.label, entry.seconds, entry.extras) == (
         {"product": "square", "scene": "Teddy"},
         1.5,
@@ -68,7 +69,7 @@ def test_a_look_finds_what_is_damaged_and_says_so(store: Store, make: Callable[.
     "key", ["", "x", "../" * 20, "A" * 64, "0" * 63, "0" * 65, "0" * 64 + "\n", "/etc/passwd", "\u0660" * 64]
 )
 def test_keys_are_never_paths(store: Store, key: str) -> None:
-    for ask in (store.find, store.check, store.look, store.has, store.require, store.open, store.claim, store.claimant):
+    for ask in (store.find, store.check, store.look, store.require, store.open, store.claim, store.claimant):
         with pytest.raises(InvalidKey, match="is not a key"):
             ask(key)
 

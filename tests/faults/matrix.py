@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tests.faults import inputs, keys, machine, processes, storage
-from tests.faults.runs import changes, mistakes, workers
+from tests.faults.runs import changes, far_cluster, mistakes, objects, workers
 from tests.faults.tally import Tally
 
 PROMISED = 5000
@@ -54,6 +54,18 @@ ROWS = (
     Row(22, "calibrations that claim absurd ranges", mistakes.absurd_ranges, 1),
     Row(23, "records of a sweep", changes.records_of_a_sweep, 0.2),
     Row(24, "another CPU, and a result that differs", changes.other_cpus, 1),
+    Row(25, "S3: kill -9 before and after each request that changes something", objects.killed_at_steps, 0.03),
+    Row(
+        26,
+        "object store in memory: bits flipped; objects deleted, swapped, edited, foreign",
+        objects.damaged_objects,
+        0.1,
+    ),
+    Row(27, "S3: many processes on the same keys, with gc and verify", objects.crowds, 0.1),
+    Row(
+        28, "S3: slow, failing, conflicting and lost answers, dropped connections, late lists", objects.bad_stores, 0.1
+    ),
+    Row(29, "S3 and four workers: workers killed while requests go wrong", far_cluster.killed_workers, 0.1),
 )
 COLUMNS = ("injected", "wrong", "lost", "leftovers", "tracebacks")
 HEADINGS = ("faults", "wrong results", "lost products", "leftovers", "tracebacks")

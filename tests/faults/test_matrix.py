@@ -13,7 +13,8 @@ from tests.faults.matrix import PROMISED, ROWS, Row, markdown, run_row, summary,
 
 PROJECT = Path(__file__).parents[2]
 LEAST = {1: 6, 2: 2, 3: 1, 4: 2, 5: 7, 6: 400, 7: 50, 8: 20, 9: 1000, 10: 50, 11: 80, 12: 200,
-         13: 1, 14: 2, 15: 4, 16: 11, 17: 4, 18: 14, 19: 5, 20: 6, 21: 8, 22: 4, 23: 2, 24: 4}  # fmt: skip
+         13: 1, 14: 2, 15: 4, 16: 11, 17: 4, 18: 14, 19: 5, 20: 6, 21: 8, 22: 4, 23: 2, 24: 4,
+         25: 2, 26: 40, 27: 4, 28: 20, 29: 2}  # fmt: skip
 """Faults that the quick form of each row injects at least: a row that does nothing would pass otherwise."""
 
 

@@ -42,7 +42,7 @@ def other_code(scale: float) -> Tally:
     """Let a worker have another version of a file than the run's own process."""
     tally = Tally()
     for path, module in EDITS[: max(1, int(len(EDITS) * scale))]:
-        with world.folder() as root, _edited_installation(root.parent, path) as names, _cluster(0) as address:
+        with world.folder() as root, _edited_installation(root.parent, path) as names, cluster(0) as address:
             worker = _worker(address, names, root.parent / "log")
             tally.injected += 1
             try:
@@ -80,7 +80,7 @@ def _worker(address: str, names: Path, log: Path) -> "subprocess.Popen[bytes]":
 
 
 @contextmanager
-def _cluster(workers: int) -> Iterator[str]:
+def cluster(workers: int) -> Iterator[str]:
     """Start a scheduler, with worker processes that are started again when they die."""
     from distributed import LocalCluster
 
@@ -98,13 +98,13 @@ def _nothing_left(tally: Tally, store: Store, where: str) -> None:
 def killed_workers(scale: float) -> Tally:
     """Kill one of four workers at a random time of a run of eight scenes; then the scheduler, and all workers."""
     tally, chance = Tally(), random.Random(16)
-    with _cluster(4) as address:
+    with cluster(4) as address:
         undisturbed, expected = _undisturbed(address)
         slowest = 0.0
         for number in range(max(2, int(60 * scale))):
             where = f"kill {number}"
             with world.folder() as root:
-                killer = _Killer(address, chance.uniform(0, undisturbed), chance.randrange(4))
+                killer = Killer(address, chance.uniform(0, undisturbed), chance.randrange(4))
                 seconds = _run(tally, Store(root), address, expected, where)
                 killer.join()
                 slowest = max(slowest, seconds / undisturbed)
@@ -141,7 +141,7 @@ def _run(tally: Tally, store: Store, address: str, expected: dict[str, str], whe
     return time.monotonic() - started
 
 
-class _Killer:
+class Killer:
     """Kills a worker after a while, and waits until the cluster is whole again."""
 
     def __init__(self, address: str, after: float, which: int) -> None:
@@ -236,7 +236,7 @@ def _no_workers(tally: Tally) -> None:
     patience, answer = clusters.PATIENCE, deployment.ANSWER
     clusters.PATIENCE = 1.5
     try:
-        with world.folder() as root, _cluster(0) as address:
+        with world.folder() as root, cluster(0) as address:
             tally.injected += 1
             _refused(tally, Store(root), slow.scenes(1), address, "no worker has been there", "no workers")
         deployment.ANSWER = 1.5  # nobody listens at these addresses, however long one waits
