@@ -54,7 +54,7 @@ ROWS = (
     Row(22, "calibrations that claim absurd ranges", mistakes.absurd_ranges, 1),
     Row(23, "records of a sweep", changes.records_of_a_sweep, 0.2),
     Row(24, "another CPU, and a result that differs", changes.other_cpus, 1),
-    Row(25, "S3: kill -9 before and after each request that changes something", objects.killed_at_steps, 0.03),
+    Row(25, "S3: kill -9 before and after each request that changes something", objects.killed_at_steps, 0.016),
     Row(
         26,
         "object store in memory: bits flipped; objects deleted, swapped, edited, foreign",

@@ -26,7 +26,7 @@ def killed_workers(scale: float) -> Tally:
         expected = {each.key: each.digest for each in world.run(Store(root), graph, workers=16).values()}
     slowest, kills = 0.0, 0
     with bucket.opened() as port, proxy(port, faults) as spoilt, pointed_at(spoilt), cluster(4) as address:
-        undisturbed = _run(tally, Store(fresh_url()), address, expected, "no kill")
+        undisturbed = _run(tally, Store(fresh_url()), address, expected, "no kill") if scale >= 1 else 3.0
         while kills < max(1, int(20 * scale)) or (scale >= 1 and faults.injected.total() < 200):
             killers = [
                 Killer(address, chance.uniform(0, undisturbed), which) for which in chance.sample(range(4), KILLS)

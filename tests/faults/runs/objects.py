@@ -41,7 +41,7 @@ def damaged_objects(scale: float) -> Tally:
         store = Store("memory://damaged")
         made = world.run(store, world.whole())
         keys = [each.key for each in made.values()]
-        _flip(tally, store, keys[-1], chance, 10**6 if scale >= 1 else 50)
+        _flip(tally, store, keys[-1], chance, 10**6 if scale >= 1 else 30)
         for key in keys if scale >= 1 else keys[2:3]:
             for number in range(len(paths_of(store, key))):
                 _damage_one(tally, store, key, number, scale, chance)
@@ -165,7 +165,7 @@ def crowds(scale: float) -> Tally:
                     for each, graph in enumerate(graphs)
                 }
                 for name, job in (("clean", bucket.job_clean), ("verify", bucket.job_verify)):
-                    everybody[name] = world.start(job, url, bucket.environment(), logs / name, 6)
+                    everybody[name] = world.start(job, url, bucket.environment(), logs / name, 6 if scale >= 1 else 2)
                 for name, process in everybody.items():
                     tally.injected += 1
                     if (code := world.finish(process)) != 0:
@@ -182,7 +182,7 @@ def bad_stores(scale: float) -> Tally:
         for number, chosen in enumerate([(each,) for each in kinds] * 4 if scale >= 1 else [kinds]):
             _run_through(tally, port, Faults(0.2, chosen, slow=0.05, seed=number), f"{chosen[0]}, {number}")
         for number in range(max(1, int(8 * scale))):
-            _run_through(tally, port, Faults(late=1.0), f"late list {number}", cleaning=True)
+            _run_through(tally, port, Faults(late=1.0 if scale >= 1 else 0.5), f"late list {number}", cleaning=True)
         _gone(tally)
     return tally
 
