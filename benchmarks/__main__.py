@@ -16,6 +16,7 @@ NAMES = (
     "training",
     "growth",
     "workers",
+    "cluster",
     "cached_run",
     "many_scenes",
     "own_pairs",

@@ -31,8 +31,8 @@ def open_store(folder: Path | str | None = None) -> Store:
     """Return the cache in ``folder``, or at a URL; by default in ``$PIPELINE_CACHE`` or the user's cache folder."""
     from platformdirs import user_cache_path
 
-    chosen = folder or os.environ.get(CACHE_VARIABLE) or user_cache_path("semidense-stereo", appauthor=False)
-    return Store(user_path(str(chosen)))
+    chosen = str(folder or os.environ.get(CACHE_VARIABLE) or user_cache_path("semidense-stereo", appauthor=False))
+    return Store(chosen if "://" in chosen else user_path(chosen))
 
 
 Data = str | Path | Dataset

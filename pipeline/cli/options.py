@@ -45,9 +45,10 @@ ConfigOption = Annotated[
     ),
 ]
 CacheOption = Annotated[
-    Path | None,
+    str | None,  # a path would lose one of a URL's slashes
     typer.Option(
         "--cache",
+        metavar="FOLDER|URL",
         help="Folder of the cache, or a URL: s3://, gs:// or az:// [default: $PIPELINE_CACHE, else your user cache "
         "folder].",
     ),

@@ -231,7 +231,7 @@ def _task(
     settings: tuple[str, ...],
     config: Path | None,
     train: bool,
-    cache: Path | None,
+    cache: str | None,
     preset: str | None,
 ) -> "Task":
     from semidense.pipeline.api import Task

@@ -270,3 +270,15 @@ def test_a_file_that_ends_too_early_is_a_fault_and_no_wish_to_stop(
 def test_no_command_shows_what_there_is(invoke: Invoke) -> None:
     ran = invoke()
     assert "Usage: pipeline" in ran.out + ran.err
+
+
+@pytest.mark.parametrize("url", ["http://example.org/x", "ftp://a/b"])
+def test_a_url_that_is_no_cache_is_told_as_it_was_typed(
+    invoke: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, url: str
+) -> None:
+    for ran in (
+        invoke("cache", "ls", "--cache", url),
+        (monkeypatch.setenv("PIPELINE_CACHE", url), invoke("cache", "ls"))[1],
+    ):
+        assert ran.code == 2
+        assert f"{url} is no place for a cache: name a folder, or an object store as s3://" in ran.err
