@@ -3,7 +3,7 @@
 import threading
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from semidense.cache import Draft, Store
 from semidense.pipeline.execution.claims import Claims
 from semidense.pipeline.execution.cluster.proof import require_same
+from semidense.pipeline.execution.cluster.sharing import ROOM
 from semidense.pipeline.execution.tiles import Labelled, labelled, own
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.plan.errors import StageFailed, StageRefused, told_of_stage
@@ -132,6 +133,12 @@ class Context:
         if self.runner is not None:
             require_same(step, self.runner)
             keep_freed_memory()
+
+    def room(self, step: Step) -> AbstractContextManager[None]:
+        """Return the context in which a step's work is done: on a cluster, a training has its worker to itself."""
+        if self.runner is None:
+            return nullcontext()
+        return ROOM.alone() if step.stage.monitored else ROOM.together()
 
 
 @dataclass(frozen=True)

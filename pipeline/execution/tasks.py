@@ -85,7 +85,7 @@ def make_tile(context: Context, job: Job, rows: Rows) -> Span | None:
     if job.draft is None:
         return None
     begun, step = time.time(), job.step
-    with explained(step, str(rows)):
+    with explained(step, str(rows)), context.room(step):
         context.admit(step)
         if job.draft.published() or _holds_tile(job.draft, step.stage.outputs, rows):
             return None
@@ -144,7 +144,7 @@ def make_whole(context: Context, job: Job) -> Span | None:
     if job.draft is None:
         return None
     begun, step = time.time(), job.step
-    with explained(step):
+    with explained(step), context.room(step):
         context.admit(step)
         if job.draft.published() or all(job.draft.holds(output.name) for output in step.stage.outputs):
             return None

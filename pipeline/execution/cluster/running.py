@@ -2,6 +2,7 @@
 
 import logging
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -45,6 +46,8 @@ def run_on_cluster(
 
     with _quietly(), _explained(address), connected(address) as client:
         watch.deployed(require_able(client, lease, code, str(store.root)))
+        _note_tasks(client)
+        began = time.time()
         graph, keys = tasks()
         futures = client.get(graph, list(keys), sync=False)
         try:
@@ -52,7 +55,41 @@ def run_on_cluster(
         except BaseException:
             _abandon(client, lease)
             raise
+        if told := _time_line(client, began):
+            watch.deployed(told)
         return {step_id: made[step_id] for step_id in (future.result().step.id for future in futures)}
+
+
+def _note_tasks(client: Any) -> None:  # noqa: ANN401
+    """Have the scheduler note, from now on, which worker is at which task, as its dashboard does."""
+    with suppress(Exception):  # a run does not need it
+        client.get_task_stream(count=0)
+
+
+def _time_line(client: Any, began: float) -> str | None:  # noqa: ANN401
+    """Return one line about who was at work on what since a run began; None if the scheduler noted nothing."""
+    with suppress(Exception):
+        return told_time_line(client.get_task_stream(start=began), time.time() - began)
+    return None
+
+
+def told_time_line(tasks: Sequence[Mapping[str, Any]], seconds: float) -> str | None:
+    """Return how long a run took, which part of it its workers were at work, and on what longest; None without tasks.
+
+    Args:
+        tasks: as Dask's task stream gives them.
+        seconds: that the run took.
+    """
+    spent: Counter[str] = Counter()
+    for task in tasks:
+        computed = (each["stop"] - each["start"] for each in task["startstops"] if each["action"] == "compute")
+        spent[str(task["key"]).partition("-")[0]] += sum(computed)
+    threads = len({(task["worker"], task["thread"]) for task in tasks})
+    if not threads:
+        return None
+    longest = ", ".join(f"{product} {most:.1f} s" for product, most in spent.most_common(3))
+    part = 100 * spent.total() / threads / seconds
+    return f"cluster: done in {seconds:.1f} s; its workers were at work {part:.0f} % of that, longest on {longest}"
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """Where a run's tasks can be carried out, and what workers are asked before they are given work."""
 
 import json
+import re
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -165,6 +166,7 @@ def test_keys_travel_and_arrays_do_not(tmp_path: Path, monkeypatch: pytest.Monke
             assert _run(Store(tmp_path / name), address, told) > 2 * 10 * width * 4 * 2, "bytes of two volumes a scene"
             sent[name] = bytes_so_far() - before
             assert told.lines[0].startswith("cluster: 1 worker")
+            assert re.match(r"cluster: done in .* longest on (ramp|blurred|sum) \d", told.lines[1])
     assert sent["small"] > 0
     assert sent["large"] < 2 * sent["small"] + 100_000
 
