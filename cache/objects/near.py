@@ -6,28 +6,37 @@ file that is damaged, or deleted by anybody at any time, is read from the store 
 
 import hashlib
 import os
+import re
 import secrets
 import threading
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
+from semidense.cache.errors import CacheUnavailable
 from semidense.cache.files import remove
 
 FOLDER_VARIABLE, BYTES_VARIABLE = "PIPELINE_NEAR", "PIPELINE_NEAR_BYTES"
 """Names of environment variables: the folder, and the most bytes that it may take; 0: nothing is kept."""
 MOST_BYTES = 20 * 10**9
+_BYTES = re.compile(r"\d{1,18}", re.ASCII)
 _LEFT = 0.8
 """The part of the limit that is left after a cleaning."""
 
 
 def near() -> "Near":
-    """Return what this machine keeps, as the environment says."""
+    """Return what this machine keeps, as the environment says.
+
+    Raises:
+        CacheUnavailable: if the limit is not a number of bytes.
+    """
     from platformdirs import user_cache_path
 
     folder = os.environ.get(FOLDER_VARIABLE) or user_cache_path("semidense-stereo-near", appauthor=False)
-    text = os.environ.get(BYTES_VARIABLE, "")
-    return _near(Path(folder).expanduser(), int(text) if text.isdecimal() else MOST_BYTES)
+    text = os.environ.get(BYTES_VARIABLE) or str(MOST_BYTES)
+    if not _BYTES.fullmatch(text):
+        raise CacheUnavailable(f"{BYTES_VARIABLE} is {text!r}: write a number of bytes, such as {MOST_BYTES}, or 0")
+    return _near(Path(folder).expanduser(), int(text))
 
 
 @lru_cache(8)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from semidense.cache import CacheUnavailable
 from semidense.cache.objects.near import Near, near
 
 
@@ -52,3 +53,10 @@ def test_the_environment_says_where_and_how_much(tmp_path: Path, monkeypatch: py
     monkeypatch.setenv("PIPELINE_NEAR_BYTES", "3")
     keep(near(), b"one", b"four")
     assert [path.read_bytes() for path in (tmp_path / "here").glob("*/*")] == [b"one"]
+
+
+@pytest.mark.parametrize("text", ["5GB", "-1", "1e9", "9" * 5000])
+def test_a_limit_that_is_no_number_of_bytes_is_refused(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setenv("PIPELINE_NEAR_BYTES", text)
+    with pytest.raises(CacheUnavailable, match=r"PIPELINE_NEAR_BYTES is .*: write a number of bytes"):
+        near()
