@@ -1,7 +1,7 @@
 """Full-size MiddEval3 on many workers, simulated: ``python -m benchmarks.simulation DIR/MiddEval3/trainingQ``.
 
 What is simulated is the very graph of tasks that a cluster is given. Each task takes what it took on one thread of this
-machine for a synthetic scene, in proportion to its pixels, or to its cells where a volume is read or written. A free
+machine for two synthetic scenes: a fixed part, and one in proportion to the pixels, or to the cells of a volume. A free
 worker takes the ready task that Dask's own order puts first. The scheduler handles one task at a time, in seconds that
 are measured here with tasks that do nothing. The store and the network take as long as this machine's disk.
 """
@@ -9,7 +9,7 @@ are measured here with tasks that do nothing. The store and the network take as 
 import heapq
 import re
 import tempfile
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,13 +24,15 @@ from semidense.pipeline.api import Task, run, status
 from semidense.pipeline.execution.scheduler import _graph
 from semidense.pipeline.plan.plan import Plan
 
-MEASURED = (256, 384, 48)
-"""Rows, columns and disparities of the scene that is measured."""
+MEASURED = ((96, 128, 16), (192, 256, 32))
+"""Rows, columns and disparities of the two scenes that are measured: from both follow what is fixed and what grows."""
 FULL = 4
 """How many times the size of a quarter-size scene is in each of its dimensions."""
 EMPTY_TASKS = 2000
 Size = tuple[int, int, int]
 """Rows, columns, disparities."""
+Kind = tuple[str, str]
+"""A product, and the function of a task for it."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,12 @@ class Outcome:
     chain: float
     scheduler: float
     chain_products: Mapping[str, float]
+
+
+def kind_of(key: str) -> Kind:
+    """Return the kind of the task of a key."""
+    product, _, rest = key.partition("-")
+    return product, rest.partition("-")[0]
 
 
 def scene_of(size: Size) -> str:
@@ -75,39 +83,42 @@ def amounts(plan: Plan, size: Size) -> dict[str, int]:
     }
 
 
-def rates(preset: str) -> dict[tuple[str, str], float]:
-    """Return the seconds a pixel or cell of all tasks of one kind, by product and function, of one thread."""
-    found: dict[tuple[str, str], float] = defaultdict(float)
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        for number in range(2):  # the first run compiles loops
-            task = Task(scene_of(MEASURED), cache=Path(folder) / str(number), preset=preset)
-            amount = amounts(status(task), MEASURED)
-            found.clear()
-            with Profiler() as profiler:
-                run(task, workers=1)
-            for each in profiler.results:
-                product, function = each.key.split("-")[:2]
-                found[product, function] += (each.end_time - each.start_time) / amount.get(product, 1)
+def measured(size: Size, preset: str) -> tuple[dict[Kind, float], dict[str, int]]:
+    """Return the seconds of all tasks of a kind on one thread, and what they are in proportion to by product."""
+    found: dict[Kind, float] = defaultdict(float)
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, Profiler() as profiler:
+        task = Task(scene_of(size), cache=Path(folder), preset=preset)
+        amount = amounts(status(task), size)
+        run(task, workers=1)
+    for each in profiler.results:
+        found[kind_of(each.key)] += each.end_time - each.start_time
+    return found, amount
+
+
+def rates(preset: str) -> dict[Kind, tuple[float, float]]:
+    """Return the fixed seconds of all tasks of a kind, and those for each pixel or cell."""
+    measured(MEASURED[0], preset)  # it compiles loops
+    (small, less), (large, more) = (measured(size, preset) for size in MEASURED)
+    found = {}
+    for kind in small.keys() & large.keys():
+        product = kind[0]
+        slope = max(0.0, (large[kind] - small[kind]) / (more[product] - less[product])) if product in less else 0.0
+        found[kind] = max(0.0, small[kind] - slope * less.get(product, 0)), slope
     return found
 
 
-def graph_of(size: Size, preset: str, rate: Mapping[tuple[str, str], float]) -> dict[str, Work]:
+def graph_of(size: Size, preset: str, rate: Mapping[Kind, tuple[float, float]]) -> dict[str, Work]:
     """Return the tasks of one scene by key: those that a cluster is given, and the seconds of each."""
     with tempfile.TemporaryDirectory() as folder:
         plan = status(Task(scene_of(size), cache=Path(folder), preset=preset))
     context: Any = None
     graph, _ = _graph(plan, context)
-    amount, kinds = amounts(plan, size), {key: tuple(key.split("-")[:2]) for key in graph}
-    count: dict[tuple[str, ...], int] = defaultdict(int)
-    for kind in kinds.values():
-        count[kind] += 1
-    return {
-        key: Work(
-            frozenset(map(str, task.dependencies)),
-            rate.get(kinds[key], 0.0) * amount.get(kinds[key][0], 0) / count[kinds[key]],  # type: ignore[call-overload]
-        )
-        for key, task in graph.items()
+    amount, count = amounts(plan, size), Counter(map(kind_of, graph))
+    seconds = {
+        kind: (rate[kind][0] + rate[kind][1] * amount.get(kind[0], 0)) / tasks if kind in rate else 0.0
+        for kind, tasks in count.items()
     }
+    return {key: Work(frozenset(map(str, task.dependencies)), seconds[kind_of(key)]) for key, task in graph.items()}
 
 
 def simulate(tasks: Mapping[str, Work], order: Mapping[str, int], workers: int, handling: float) -> Outcome:

@@ -37,7 +37,8 @@ def killed_workers(scale: float) -> Tally:
                 each.join()
     tally.injected = kills + faults.injected.total()
     tally.figures |= {"workers killed": kills, "requests spoilt": faults.injected.total()}
-    tally.figures["slowest run in ones without kills"] = round(slowest / undisturbed, 1)
+    if scale >= 1:
+        tally.figures["slowest run in ones without kills"] = round(slowest / undisturbed, 1)
     return tally
 
 
