@@ -7,7 +7,6 @@ are measured here with tasks that do nothing. The store and the network take as 
 """
 
 import heapq
-import re
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,6 +19,7 @@ from dask.diagnostics import Profiler
 from rich.console import Console
 
 from benchmarks.harness import timed, write
+from semidense.datasets import open_dataset
 from semidense.pipeline.api import Task, run, status
 from semidense.pipeline.execution.scheduler import _graph
 from semidense.pipeline.plan.plan import Plan
@@ -66,10 +66,10 @@ def scene_of(size: Size) -> str:
 
 
 def sizes_in(folder: Path) -> Iterator[Size]:
-    """Yield the full sizes of the quarter-size scenes in a folder, as their calib.txt tells."""
-    for path in sorted(folder.glob("*/calib.txt")):
-        told = dict(re.findall(r"(\w+)=(\d+)\s*$", path.read_text(), re.MULTILINE))
-        yield int(told["height"]) * FULL, int(told["width"]) * FULL, int(told["ndisp"]) * FULL
+    """Yield the full sizes of the quarter-size scenes in a folder of Middlebury."""
+    for scene in open_dataset(f"middlebury:{folder}").scenes:
+        (rows, columns), disparities = scene.size, scene.disparities
+        yield rows * FULL, columns * FULL, (disparities.maximum - disparities.minimum + 1) * FULL
 
 
 def amounts(plan: Plan, size: Size) -> dict[str, int]:
@@ -172,7 +172,7 @@ def handling_seconds() -> float:
 
 
 def main(
-    folder: Annotated[Path, typer.Argument(help="quarter-size scenes, each with its calib.txt")],
+    folder: Annotated[Path, typer.Argument(help="quarter-size scenes of Middlebury")],
     workers: Annotated[list[int] | None, typer.Option()] = None,
     preset: Annotated[str, typer.Option()] = "robust",
 ) -> None:
