@@ -34,7 +34,7 @@ def main(
     scene = f"synthetic:train=0,test=1,height={rows},width={columns},disparities={disparities}"
     with (
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
-        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=60) as cluster,
     ):
         task = Task(scene, cache=Path(folder))
         run(task)

@@ -164,7 +164,7 @@ def handling_seconds() -> float:
     from distributed import Client, LocalCluster
 
     with (
-        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=60) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
         client.gather(client.map(str, range(100)))

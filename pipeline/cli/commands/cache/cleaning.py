@@ -35,7 +35,7 @@ class Wish:
     unused_for: str | None = None
     max_size: str | None = None
 
-    def limits(self, folder: Path | None) -> Limits:
+    def limits(self, folder: str | None) -> Limits:
         """Return what that means for the entries of a cache.
 
         Raises:
@@ -49,7 +49,7 @@ class Wish:
         reached = frozenset(self._reached(folder, entries)) if self.keep else None
         return Limits(reached, seconds, None if largest is None else int(largest), _useless(entries))
 
-    def _reached(self, folder: Path | None, entries: Iterable[Entry]) -> Iterator[str]:
+    def _reached(self, folder: str | None, entries: Iterable[Entry]) -> Iterator[str]:
         """Yield the keys that the datasets reach, each with each configuration."""
         by_label: dict[tuple[tuple[str, str], ...], list[Entry]] = {}
         for entry in entries:
@@ -85,7 +85,7 @@ def _amount(text: str | None, units: dict[str, float] | dict[str, int], option: 
     return float(match[1]) * units[match[2]]
 
 
-def clean(folder: Path | None, wish: Wish, *, yes: bool, as_json: bool) -> None:
+def clean(folder: str | None, wish: Wish, *, yes: bool, as_json: bool) -> None:
     """Print what can be deleted and why; delete it if ``yes``."""
     store = open_store(folder)
     found = survey(store, wish.limits(folder))

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
@@ -73,7 +72,7 @@ def _only(entries: Iterable[Entry], start: str) -> Entry:
     return found[0]
 
 
-def list_entries(folder: Path | None, selection: Selection, as_json: bool) -> None:
+def list_entries(folder: str | None, selection: Selection, as_json: bool) -> None:
     """Print a line an entry, oldest first, with the settings that it belongs to."""
     store = open_store(folder)
     entries, settings, used = selection.of(store), Settings(store.entries()), store.last_used()
@@ -107,7 +106,7 @@ def _time(seconds: float) -> str:
     return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="seconds")
 
 
-def verify_entries(folder: Path | None, selection: Selection, as_json: bool) -> bool:
+def verify_entries(folder: str | None, selection: Selection, as_json: bool) -> bool:
     """Check every byte of the entries, print what is wrong; return whether nothing is."""
     store = open_store(folder)
     keys = None if selection.is_all else [entry.key for entry in selection.require(store)]
@@ -132,7 +131,7 @@ def verify_entries(folder: Path | None, selection: Selection, as_json: bool) -> 
     return sound
 
 
-def print_sizes(folder: Path | None, as_json: bool) -> None:
+def print_sizes(folder: str | None, as_json: bool) -> None:
     """Print how much space each product takes, and everything together."""
     store = open_store(folder)
     sizes = size(store)

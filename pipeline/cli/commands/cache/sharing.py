@@ -10,7 +10,7 @@ from semidense.pipeline.results.provenance import Provenance, ancestry, tree_lin
 from semidense.pipeline.results.text import bytes_text, results
 
 
-def export_archive(folder: Path | None, selection: Selection, target: Path, *, inputs: bool, as_json: bool) -> None:
+def export_archive(folder: str | None, selection: Selection, target: Path, *, inputs: bool, as_json: bool) -> None:
     """Write the selected entries into an archive, with ``inputs`` also all that they were made from.
 
     Raises:
@@ -32,7 +32,7 @@ def export_archive(folder: Path | None, selection: Selection, target: Path, *, i
         results().print(f"wrote {len(entries)} entries, {bytes_text(size)}, to {target}", markup=False)
 
 
-def import_archive(folder: Path | None, source: Path, as_json: bool) -> None:
+def import_archive(folder: str | None, source: Path, as_json: bool) -> None:
     """Take over the entries of an archive, and say what became of each.
 
     Raises:
@@ -50,7 +50,7 @@ def import_archive(folder: Path | None, source: Path, as_json: bool) -> None:
         results().print(f"{len(rows)} entries checked: {told or 'it holds none'}", markup=False)
 
 
-def trace(folder: Path | None, key: str, graph: Path | None, as_json: bool) -> None:
+def trace(folder: str | None, key: str, graph: Path | None, as_json: bool) -> None:
     """Print, and draw if asked to, what an entry was made from.
 
     Raises:
