@@ -24,7 +24,7 @@ SCENES = 8
 
 @pytest.fixture(scope="module")
 def port() -> Iterator[int]:
-    with s3_server() as found:
+    with s3_server(page=1000) as found:  # a list of many pages begins anew when one of them goes wrong
         yield found
 
 
