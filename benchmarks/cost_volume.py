@@ -9,6 +9,7 @@ project, MC-CNN fast with each of its back ends, and OpenCV's SGBM; and a pictur
 import sys
 from collections.abc import Callable
 from importlib import resources
+from itertools import cycle
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +23,8 @@ from benchmarks.guided import Side, shipped_nets
 from benchmarks.harness import FOLDER, PAIRS, Ratio, compare, median_seconds, report, timed, write
 from benchmarks.peers import AccurateMatcher, PeerError
 from semidense.datasets import Scene, open_dataset
+from semidense.pipeline.figures.colours import LINES
+from semidense.pipeline.figures.drawing import legend_below, new_figure
 from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
 from semidense.stages.baselines.declaration import SgmParams
 from semidense.stages.baselines.sgm import match_semi_global
@@ -40,6 +43,8 @@ from semidense.stages.transforms.gray import to_gray
 FASTEST = "MC-CNN fast, onnx dw"
 """The quickest form of MC-CNN fast."""
 PICTURE = Path("docs/pictures/matchers.png")
+MARKERS = "osD^vPX"
+"""One for each matcher, so that no two are told apart by their colours alone."""
 Map = Callable[[], NDArray[np.float32]]
 
 
@@ -164,21 +169,19 @@ def _fast_matchers(gray: tuple[NDArray[np.uint8], NDArray[np.uint8]], disparitie
 
 
 def _draw(matchers: dict[str, dict[str, float]], title: str, path: Path) -> None:
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(7.5, 3.6), layout="constrained")
-    for name, found in matchers.items():
-        axes.scatter(found["seconds"], found["raw_bad"], label=name)
-    axes.set(xscale="log", xlabel="seconds", ylabel="raw error > 1 px, %", title=title)
+    figure = new_figure(title)
+    figure.set_size_inches(6.6, 4.6)
+    axes = figure.subplots()
+    styles = zip(cycle(LINES), cycle(MARKERS), matchers.items(), strict=False)
+    for colour, marker, (name, found) in styles:
+        style = {"color": colour, "marker": marker, "markersize": 10, "markeredgecolor": "black"}
+        axes.plot(found["seconds"], found["raw_bad"], linestyle="none", label=name, **style)
+    axes.set(xscale="log", xlabel="time (s)", ylabel="raw nonocc pixels off by more than 1 px (%)")
     axes.set_ylim(bottom=0)
-    axes.grid(alpha=0.3, which="both")
-    figure.legend(loc="outside right upper")
+    axes.grid(alpha=0.3)
+    legend_below(figure, axes.get_legend_handles_labels()[0])
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
+    figure.savefig(path)
 
 
 if __name__ == "__main__":

@@ -7,19 +7,25 @@ the load of the processor and the memory of the process.
 import tempfile
 from collections import defaultdict
 from collections.abc import Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from dask.diagnostics import Profiler, ResourceProfiler
+from matplotlib.axes import Axes
 from rich.console import Console
 from rich.table import Table
 
 from benchmarks.harness import timed, write
 from semidense.pipeline.api import Task, run
+from semidense.pipeline.figures.colours import BLUE, LINES
+from semidense.pipeline.figures.drawing import legend_below, new_figure
 from semidense.pipeline.plan.steps import products
 
 PICTURE = Path("docs/pictures/timeline.png")
+HATCHES = ("", "//", "..")
+"""Patterns that tell products of the same colour apart."""
 SCENE = "synthetic:train=0,test=1,height=240,width=320,disparities=24"
 
 
@@ -60,40 +66,45 @@ def _seconds(results: Sequence[Any]) -> dict[str, tuple[int, float]]:
 
 
 def _draw(results: Sequence[Any], resources: Sequence[Any], dataset: str, path: Path) -> None:
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
-
     start = min(each.start_time for each in results)
+    figure = new_figure(f"{dataset}: which worker did what and when")
+    figure.set_size_inches(8, 5.6)
+    axes = figure.subplots(3, 1, sharex=True, height_ratios=(2, 1, 1))
+    _draw_tasks(axes[0], results, start)
+    times = [each.time - start for each in resources]
+    _draw_load(axes[1], times, [each.cpu for each in resources], "processor (%)")
+    _draw_load(axes[2], times, [each.mem for each in resources], "memory (MB)")
+    axes[2].set(xlabel="time (s)")
+    legend_below(figure, axes[0].get_legend_handles_labels()[0])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+
+
+def _draw_tasks(axes: Axes, results: Sequence[Any], start: float) -> None:
+    """Draw a bar a task in the row of its worker, in the colour and hatching of its product."""
     workers = {name: row for row, name in enumerate(sorted({each.worker_id for each in results}))}
-    heights = {"height_ratios": (2, 1, 1)}
-    figure, axes = plt.subplots(3, 1, figsize=(9, 5), sharex=True, layout="constrained", gridspec_kw=heights)
-    upper = axes[0]
-    for index, product in enumerate(dict.fromkeys(product_of(each.key) for each in results)):
+    styles = cycle([(colour, hatch) for hatch in HATCHES for colour in LINES])
+    made = dict.fromkeys(product_of(each.key) for each in results)
+    for product, (colour, hatch) in zip(made, styles, strict=False):
         own = [each for each in results if product_of(each.key) == product]
-        upper.barh(
+        axes.barh(
             [workers[each.worker_id] for each in own],
             [each.end_time - each.start_time for each in own],
             left=[each.start_time - start for each in own],
-            color=f"C{index}",
+            color=colour,
+            hatch=hatch,
             label=product,
             edgecolor="white",
             linewidth=0.3,
         )
-    upper.set(yticks=range(len(workers)), yticklabels=[f"worker {row + 1}" for row in workers.values()], title=dataset)
-    upper.legend(loc="upper left", bbox_to_anchor=(1, 1), fontsize="small")
-    times = [each.time - start for each in resources]
-    for lower, values, unit in (
-        (axes[1], [each.cpu for each in resources], "processor, %"),
-        (axes[2], [each.mem for each in resources], "memory, MB"),
-    ):
-        lower.plot(times, values)
-        lower.set(ylabel=unit, ylim=(0, None))
-    axes[2].set(xlabel="seconds")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    names = [f"worker {row + 1}" for row in workers.values()]
+    axes.set_yticks(range(len(workers)), names)
+
+
+def _draw_load(axes: Axes, times: Sequence[float], values: Sequence[float], label: str) -> None:
+    axes.plot(times, values, color=BLUE)
+    axes.set(ylabel=label, ylim=(0, None))
+    axes.grid(alpha=0.3)
 
 
 if __name__ == "__main__":

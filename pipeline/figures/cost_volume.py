@@ -13,7 +13,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from semidense.pipeline.figures.colours import BLUE, ORANGE, RED, cost_colours
+from semidense.pipeline.figures.colours import BLUE, GREEN, ORANGE, RED, cost_colours
 from semidense.pipeline.figures.drawing import Scale, draw_map, image_panels, legend_below, none_patch
 from semidense.pipeline.plan.errors import UsageError
 from semidense.stages.disparity.winner_takes_all import winner_take_all
@@ -28,7 +28,11 @@ _ROWS = 32
 
 
 def draw_costs(
-    figure: Figure, dataset: xr.Dataset, pixel: tuple[int, int] | None = None, disparity: int | None = None
+    figure: Figure,
+    dataset: xr.Dataset,
+    pixel: tuple[int, int] | None = None,
+    disparity: int | None = None,
+    truth: xr.Dataset | None = None,
 ) -> None:
     """Draw a slice of the volume and the cost curve of a pixel, which is marked on the slice.
 
@@ -37,6 +41,7 @@ def draw_costs(
         dataset: the product ``costvolume``.
         pixel: row and column; None for the pixel nearest to the centre that has a valid cost.
         disparity: px; None for the median of the cheapest disparities in the middle rows.
+        truth: the product ``truth`` of the scene; where it is known at the pixel, it is marked on the curve.
 
     Raises:
         UsageError: if the pixel or the disparity lies outside the volume.
@@ -51,6 +56,8 @@ def draw_costs(
     curve = dataset["cost"].isel(y=y, x=x).values.astype(np.float32)
     draw_curve(right, disparities, curve)
     right.axvline(disparities[index], color="#606060", linestyle="--", zorder=0, label="the disparity of the slice")
+    if truth is not None:
+        _mark_truth(right, float(truth["disparity"].isel(y=y, x=x)))
     right.set_title(f"costs of the pixel y = {y}, x = {x} (ring)")
     handles, _ = right.get_legend_handles_labels()
     legend_below(figure, [*handles, none_patch(costs, "no cost: not judged, or right pixel outside the image")])
@@ -109,6 +116,11 @@ def draw_curve(axes: Axes, disparities: NDArray[np.int_], costs: NDArray[np.floa
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.grid(alpha=0.3)
     _probability_axis(axes)
+
+
+def _mark_truth(axes: Axes, disparity: float) -> None:
+    if np.isfinite(disparity):
+        axes.axvline(disparity, color=GREEN, linestyle="-.", zorder=0, label=f"truth: {disparity:.4g} px")
 
 
 def _shade_invalid(axes: Axes, disparities: NDArray[np.int_], costs: NDArray[np.float32]) -> None:

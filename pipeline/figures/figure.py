@@ -101,6 +101,7 @@ def figure(
     title: str,
     pixel: tuple[int, int] | None = None,
     disparity: int | None = None,
+    truth: xr.Dataset | None = None,
 ) -> Figure:
     """Return a figure of a product, with units on every axis and black for what has no value.
 
@@ -110,13 +111,15 @@ def figure(
         title: stands above, taken literally; ``product_title`` makes one.
         pixel: of a cost volume, row and column of the pixel whose curve is drawn; None for one near the centre.
         disparity: of a cost volume, the disparity of the slice, px; None for the usual one in the middle rows.
+        truth: of a cost volume, the product ``truth`` of its scene, to be marked on the curve; None marks nothing.
 
     Raises:
-        UsageError: if a product of another package has no map, a pixel or disparity is given for another product than
-            a cost volume, or one lies outside of it.
+        UsageError: if a product of another package has no map; if a pixel, disparity or truth is given for another
+            product than a cost volume; if a pixel or disparity lies outside the volume.
     """
     draw = _DRAW.get(product, draw_any)
-    chosen = {name: value for name, value in (("pixel", pixel), ("disparity", disparity)) if value is not None}
+    options = {"pixel": pixel, "disparity": disparity, "truth": truth}
+    chosen = {name: value for name, value in options.items() if value is not None}
     if chosen and product != "costvolume":
         raise UsageError(f"{product}: a {next(iter(chosen))} is chosen in a costvolume, not in this product")
     drawn = new_figure(title)

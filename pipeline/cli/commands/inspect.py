@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from semidense.cache import Store
-from semidense.pipeline.api import Task
+from semidense.pipeline.api import Task, status
 from semidense.pipeline.cli.console import print_json, why
 from semidense.pipeline.files.suggestion import run_command
 from semidense.pipeline.plan.errors import UsageError
@@ -22,11 +22,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Inspection:
-    """A product that is there, opened lazily."""
+    """A product that is there, opened lazily.
+
+    Attributes:
+        planned: its step, with its key.
+        dataset: the product.
+        store: the cache that holds it.
+        truth: of a cost volume, the product ``truth`` of its scene; None if that is not cached.
+    """
 
     planned: Planned
     dataset: "xr.Dataset"
     store: Store
+    truth: "xr.Dataset | None" = None
 
 
 def inspection(planned: Planned, store: Store, task: Task) -> Inspection:
@@ -40,7 +48,18 @@ def inspection(planned: Planned, store: Store, task: Task) -> Inspection:
         raise UsageError(
             f"{step.name} is not cached ({why(planned)}): make it with `{run_command(task, step.product)}`"
         )
-    return Inspection(planned, open_product(store, planned.key), store)
+    truth = _cached_truth(step.scene, store, task) if step.product == "costvolume" else None
+    return Inspection(planned, open_product(store, planned.key), store, truth)
+
+
+def _cached_truth(scene: str, store: Store, task: Task) -> "xr.Dataset | None":
+    """Return the truth of a scene; None if it has none, or if it is not cached."""
+    keys = [each.key for each in status(task, "truth").steps if _is_cached_truth(each, scene)]
+    return open_product(store, keys[0]) if keys and keys[0] else None
+
+
+def _is_cached_truth(planned: Planned, scene: str) -> bool:
+    return (planned.step.product, planned.step.scene, planned.state) == ("truth", scene, "hit")
 
 
 def draw(found: Inspection, png: Path, pixel: str | None, disparity: int | None) -> None:
@@ -54,8 +73,8 @@ def draw(found: Inspection, png: Path, pixel: str | None, disparity: int | None)
 
     step = found.planned.step
     place = _parse_pixel(pixel, found.dataset) if pixel else None
-    title = product_title(found.dataset)
-    save_png(figure(step.product, found.dataset, title=title, pixel=place, disparity=disparity), png)
+    title, truth = product_title(found.dataset), found.truth
+    save_png(figure(step.product, found.dataset, title=title, pixel=place, disparity=disparity, truth=truth), png)
 
 
 def _parse_pixel(text: str, dataset: "xr.Dataset") -> tuple[int, int]:

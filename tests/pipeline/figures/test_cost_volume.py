@@ -88,3 +88,20 @@ def test_the_volume_is_never_in_memory_as_a_whole() -> None:
     assert max(largest) == 32 * 64 * 8
     assert max(sizes) <= 2 * 32 * 64 * 8
     assert sum(sizes) < 320 * 64 * 8
+
+
+@pytest.mark.parametrize(
+    ("disparity", "told"),
+    [
+        pytest.param(1.25, ["truth: 1.25 px"], id="known"),
+        pytest.param(N, [], id="unknown at this pixel"),
+    ],
+)
+def test_the_truth_is_marked_on_the_curve(disparity: float, told: list[str]) -> None:
+    true = np.full((4, 6), 3, np.float32)
+    true[0, 1] = disparity
+    figure = new_figure("any")
+    draw_costs(figure, costvolume(), (0, 1), truth=xr.Dataset({"disparity": (("y", "x"), true)}))
+    lines = [line for line in figure.axes[1].lines if str(line.get_label()).startswith("truth")]
+    assert [line.get_label() for line in lines] == told
+    assert [line.get_xdata()[0] for line in lines] == [disparity] * len(told)

@@ -69,3 +69,10 @@ def test_what_is_not_in_the_product_is_refused(
 def test_a_picture_that_cannot_be_written_is_refused(costs: Inspection, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="cannot be written"):
         draw(costs, tmp_path / "none" / "p.png", None, None)
+
+
+def test_a_cost_volume_comes_with_the_cached_truth_of_its_scene(costs: Inspection, tmp_path: Path) -> None:
+    assert costs.truth is not None
+    assert costs.truth["disparity"].shape == costs.dataset["cost"].shape[:2]
+    draw(costs, tmp_path / "p.png", "32,40", None)
+    assert (tmp_path / "p.png").stat().st_size > 0
