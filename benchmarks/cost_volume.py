@@ -170,14 +170,14 @@ def _fast_matchers(gray: tuple[NDArray[np.uint8], NDArray[np.uint8]], disparitie
 
 def _draw(matchers: dict[str, dict[str, float]], title: str, path: Path) -> None:
     figure = new_figure(title)
-    figure.set_size_inches(6.6, 4.6)
+    figure.set_size_inches(8, 5)
     axes = figure.subplots()
     styles = zip(cycle(LINES), cycle(MARKERS), matchers.items(), strict=False)
     for colour, marker, (name, found) in styles:
         style = {"color": colour, "marker": marker, "markersize": 10, "markeredgecolor": "black"}
         axes.plot(found["seconds"], found["raw_bad"], linestyle="none", label=name, **style)
-    axes.set(xscale="log", xlabel="time (s)", ylabel="raw nonocc pixels off by more than 1 px (%)")
-    axes.set_ylim(bottom=0)
+    axes.set(xscale="log", xlabel="time (s)", ylabel="raw error > 1 px (%)")
+    axes.set_ylim(0, 1.1 * max(found["raw_bad"] for found in matchers.values()))
     axes.grid(alpha=0.3)
     legend_below(figure, axes.get_legend_handles_labels()[0])
     path.parent.mkdir(parents=True, exist_ok=True)
