@@ -11,7 +11,7 @@ from collections.abc import Callable
 from importlib import resources
 from itertools import cycle
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -174,7 +174,7 @@ def _draw(matchers: dict[str, dict[str, float]], title: str, path: Path) -> None
     axes = figure.subplots()
     styles = zip(cycle(LINES), cycle(MARKERS), matchers.items(), strict=False)
     for colour, marker, (name, found) in styles:
-        style = {"color": colour, "marker": marker, "markersize": 10, "markeredgecolor": "black"}
+        style: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 10, "markeredgecolor": "black"}
         axes.plot(found["seconds"], found["raw_bad"], linestyle="none", label=name, **style)
     axes.set(xscale="log", xlabel="time (s)", ylabel="raw error > 1 px (%)")
     axes.set_ylim(0, 1.1 * max(found["raw_bad"] for found in matchers.values()))

@@ -18,6 +18,7 @@ DOCUMENTS = [
 TEXT = "\n".join(file.read_text() for file in DOCUMENTS)
 ELSEWHERE = "roughness"
 """The stage of docs/extending.md, which is in a package of its own; tests/system/test_extension.py tries its kind."""
+NAMES = typer.main.get_command(app).commands
 BLOCKS = re.findall(r"^```\w*\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
 LINES = [line.strip() for block in BLOCKS for line in block.splitlines()]
 INLINE = [line for line in re.findall(r"`(pipeline [^`]+)`", TEXT) if len(line.split()) > 2]  # two name a command
@@ -26,6 +27,10 @@ COMMANDS = [
     for line in LINES
     if re.match(r"(\S*bin/)?pipeline(\s|$)", line) and ELSEWHERE not in line
 ]
+OPTIONS = sorted(
+    {line for line in re.findall(r"`([a-z]+ [^`]*--[^`]+)`", " ".join(TEXT.split())) if line.split()[0] in NAMES}
+)
+"""Commands in running text, named without ``pipeline``, with an option."""
 TARGETS = {line.split()[1] for line in LINES if line.startswith("make ")}
 
 
@@ -47,6 +52,25 @@ def test_the_readme_shows_commands() -> None:
 @pytest.mark.parametrize("line", [*COMMANDS, *INLINE])
 def test_a_command_of_the_readme_parses(line: str) -> None:
     parse(line)
+
+
+def unknown_options(line: str) -> list[str]:
+    """Return the options of a command named in running text that the command does not have."""
+    command, words = typer.main.get_command(app), line.split()
+    while words and words[0] in getattr(command, "commands", {}):
+        command = command.commands[words.pop(0)]
+    known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
+    return [word for word in words if word.startswith("--") and word.split("=")[0].rstrip(",.") not in known]
+
+
+@pytest.mark.parametrize("line", OPTIONS)
+def test_a_command_in_running_text_has_its_options(line: str) -> None:
+    assert unknown_options(line) == []
+
+
+def test_an_option_that_a_command_does_not_have_is_found() -> None:
+    assert len(OPTIONS) > 5
+    assert unknown_options("cache gc --keep --nope") == ["--nope"]
 
 
 @pytest.mark.parametrize("line", ["pipeline runn", "pipeline run --nope", "pipeline cache list", "pipeline run a b"])
