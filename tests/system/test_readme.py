@@ -104,3 +104,18 @@ def test_the_modules_that_the_documents_name_are_there() -> None:
     ours = [name for name in re.findall(r"`([\w/]+/\w+\.py)`", TEXT) if not name.startswith("stereo_extras/")]
     assert [name for name in ours if not any((room / name).is_file() for room in rooms)] == []
     assert len(ours) > 10, "the documents name modules in another way: find them"
+
+
+def test_each_reason_not_to_run_a_command_holds_for_one() -> None:
+    from tests.system.commands import NOT_RUN, reason
+
+    given = {reason(line) for line in COMMANDS}
+    assert given == {None, *(why for _, why in NOT_RUN)}
+
+
+def test_a_command_that_fails_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from tests.system.commands import run_all
+
+    lines = ["pipeline presets", "pipeline view", "pipeline cache ls --cache new"]
+    assert run_all(lines, tmp_path) == ["pipeline presets"]
+    assert "not run  pipeline view" in capsys.readouterr().out
