@@ -170,8 +170,12 @@ def require_able(client: Any, lease: Lease, code: Mapping[str, str], cache: str)
     Raises:
         UsageError: naming the first worker that cannot do this run's work, and why.
     """
+    from distributed.comm import CommClosedError
+
     versions = {name: version(name) for name in SHARED}
-    answers = client.run(look, lease, dict(code), versions, cache, on_error="return")
+    found = client.run(look, lease, dict(code), versions, cache, on_error="return")
+    # A worker that dies while it is asked costs nothing: each task looks at its worker's code again.
+    answers = {address: answer for address, answer in found.items() if not isinstance(answer, CommClosedError)}
     for address, answer in sorted(answers.items()):
         if not isinstance(answer, Looked):
             raise UsageError(f"the worker at {address} cannot load semidense-stereo: {first_line(answer)}")

@@ -14,7 +14,7 @@ import pytest
 from semidense.cache import Store, module_hash
 from semidense.cache.processes.lease import FolderLease
 from semidense.pipeline.execution.cluster import deployment
-from semidense.pipeline.execution.cluster.deployment import connected, count_threads, require_able
+from semidense.pipeline.execution.cluster.deployment import Looked, connected, count_threads, require_able
 from semidense.pipeline.execution.retry import attempt
 from semidense.pipeline.execution.watch import Unwatched
 from semidense.pipeline.plan.errors import UsageError
@@ -86,6 +86,28 @@ def test_a_worker_that_cannot_do_the_work_is_named_with_the_cause(
         require_able(client, mine, code, str(tmp_path))
     assert "\n" not in str(refused.value)
     assert socket.gethostname() in str(refused.value)
+
+
+class Answering:
+    """A client whose workers answer so."""
+
+    dashboard_link = None
+
+    def __init__(self, **answers: object) -> None:
+        self.answers = answers
+
+    def run(self, *_: object, **__: object) -> dict[str, object]:
+        return self.answers
+
+
+def test_a_worker_that_is_killed_while_it_is_asked_ends_no_run(tmp_path: Path) -> None:
+    from distributed.comm import CommClosedError
+
+    able, gone = Looked("host", 1, 2 * 10**9, None), CommClosedError("Stream is closed")
+    told = require_able(Answering(one=able, other=gone), lease(tmp_path), CODE, str(tmp_path))
+    assert told == "cluster: 1 worker, at least 2.0 GB of memory each"
+    with pytest.raises(UsageError, match="the worker at other cannot load semidense-stereo: No module"):
+        require_able(Answering(one=able, other=ImportError("No module")), lease(tmp_path), CODE, str(tmp_path))
 
 
 def test_a_scheduler_file_and_the_environment_name_a_scheduler(
