@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -29,17 +29,22 @@ def namespace() -> Iterator[str]:
     name = f"sd{os.getpid()}"
     try:
         ip("netns", "add", name)
-    except (OSError, subprocess.CalledProcessError) as error:
-        pytest.skip(f"this machine makes no network namespaces: {error}")
-    try:
         ip("link", "add", name, "type", "veth", "peer", "name", "far", "netns", name)
         ip("addr", "add", f"{HERE}/30", "dev", name)
         ip("link", "set", name, "up")
         ip("-n", name, "addr", "add", f"{THERE}/30", "dev", "far")
         ip("-n", name, "link", "set", "far", "up")
-        yield name
-    finally:
-        ip("netns", "del", name)
+    except (OSError, subprocess.CalledProcessError) as error:
+        _remove(name)
+        pytest.skip(f"this machine makes no network namespaces: {error}")
+    yield name
+    _remove(name)
+
+
+def _remove(namespace: str) -> None:
+    """Remove a namespace, if it is there, and with it the link into it."""
+    with suppress(OSError, subprocess.CalledProcessError):
+        ip("netns", "del", namespace)
 
 
 @contextmanager
