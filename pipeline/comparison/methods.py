@@ -16,7 +16,7 @@ MATCHERS = {
     "MC-CNN accurate": "mc_cnn_accurate",
 }
 """Other matchers, by name: their products have a ``dense`` map, and a ``disparity`` after their own checks."""
-LOWERED = "MC-CNN accurate, less 0.5 px"
+LOWERED = "MC-CNN accurate, 0.5 px subtracted"
 """MC-CNN's accurate weights give disparities about 0.5 px too high, which decides many errors above 1 px."""
 MEASURES = {
     "evaluation-Net and agreement": ("confidence", "confidence"),

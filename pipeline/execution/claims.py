@@ -102,7 +102,7 @@ class LocalClaims(Claims):
 
     @contextmanager
     def opening(self) -> Iterator[None]:
-        """Return a context in which ``stop`` waits, so that it leaves no draft of which nobody knows yet.
+        """Return a context that ``stop`` waits for, so that a draft that is just being made is not left behind.
 
         Raises:
             RunStopped: if the run ended.

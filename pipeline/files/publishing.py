@@ -30,10 +30,10 @@ def publishing(
         folder: where the files go; made if it is missing.
         record: name of the record, which the block writes like any other file.
         inputs: files that the command reads.
-        obsolete: names of files of which those are deleted that an earlier record has and this one does not.
+        obsolete: names of files to delete if an earlier record lists them and this one does not.
 
     Raises:
-        UsageError: if the folder cannot be written, or a file of somebody else would be replaced; nothing is then.
+        UsageError: if the folder cannot be written, or a file of somebody else would be replaced. Then no file changes.
     """
     writable_folder(folder)
     draft = folder / f".new-{secrets.token_hex(4)}"

@@ -14,11 +14,11 @@ from semidense.stages.matching.declaration import CostVolumeParams, Mode
 from semidense.stages.stage import Array, Inputs, Stage, StageError
 
 _LEARNT_FROM_MAPS = ("evaluation_net", "calibration")
-"""Products of which those for guided volumes are others: the errors of such maps hang together."""
+"""Products with weights of their own for guided volumes: the errors of guided maps lie together in patches."""
 _GENERAL = ("descriptor_net", "evaluation_net", "evidence_net", "calibration")
-"""Products that ``training.weights=general`` has weights of its own for: those of the preset ``robust``."""
+"""Products of the preset ``robust`` whose weights ``training.weights=general`` replaces."""
 _CALIBRATED = ("confidence", "disparity", "costvolume")
-"""Products that a calibration is about: it is of no use for those that other stages make."""
+"""Products that a calibration holds for, unless another stage makes one of them."""
 
 
 @dataclass(frozen=True)

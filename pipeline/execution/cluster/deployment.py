@@ -14,7 +14,7 @@ from semidense.pipeline.plan.environment import version
 from semidense.pipeline.plan.errors import UsageError
 
 SHARED = ("dask", "distributed", "cloudpickle")
-"""Packages of which the run and all workers need the same version: tasks travel in their formats."""
+"""Packages that must have the same version in the run and in all workers: they encode the tasks."""
 FORMS = "tcp://HOST:PORT, processes:N, a scheduler file such as scheduler.json, or env for $DASK_SCHEDULER_ADDRESS"
 ANSWER = 10.0
 """Seconds in which a scheduler must answer at first."""
