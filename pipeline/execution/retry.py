@@ -21,7 +21,7 @@ def attempt(
     scheduler: str | None = None,
     workers: int | None = None,
 ) -> tuple[Plan, dict[str, Made]]:
-    """Carry out a plan whose entries nobody cleans away meanwhile; return it and its results.
+    """Carry out a plan, and return it with its results; its entries are kept from cleaning meanwhile.
 
     An entry that is damaged after it was found is made again like any other: the run plans anew.
 

@@ -33,7 +33,7 @@ Unit = Literal["mm", "cm", "m"]
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """A matched pair. Everything is of the left view unless it says otherwise.
+    """A matched pair. All maps belong to the left view unless an attribute says otherwise.
 
     Attributes:
         scene: where it comes from.

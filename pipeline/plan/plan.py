@@ -151,13 +151,13 @@ class _Planner:
         return tuple(found[step.id] for step in steps)
 
     def _open_inputs(self, step: Step) -> dict[str, tuple[str, ...]]:
-        """Return the inputs of which one is still to be made."""
+        """Return the inputs that are not all made yet."""
         return {product: ids for product, ids in step.inputs.items() if not all(each in self.digests for each in ids)}
 
     def _state(
         self, step: Step, recipe: Recipe | None, entry: Entry | None = None, damage: str | None = None
     ) -> Planned:
-        """Return the step with its state, given what the cache has for its recipe; none: its inputs are open."""
+        """Return the step with its state, by what the cache has for its recipe; no recipe: inputs are missing."""
         if recipe is None:
             return self._not_there(step, None, self._pending(step, self._open_inputs(step)))
         if entry is None or damage or step.product in self.forced:

@@ -38,7 +38,7 @@ class Weights:
     digest: str
 
     def read(self) -> bytes:
-        """Return the bytes that the digest is of.
+        """Return the file's bytes, whose hash is ``digest``.
 
         Raises:
             StageError: if the file cannot be read, or has changed since the run was planned.
