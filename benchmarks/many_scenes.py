@@ -25,7 +25,7 @@ from semidense.pipeline.plan.building import build
 from semidense.pipeline.plan.steps import SPLIT, Step
 from semidense.pipeline.results.provenance import ancestry
 
-SECONDS = {"status": 4.0, "run": 5.0, "cache gc --keep": 5.0, "explain --trace": 4.0}
+SECONDS = {"status": 4.0, "run": 5.0, "cache gc --keep": 5.0, "explain": 4.0}
 """What each command may take at 500 scenes."""
 PLANNING = 2.0
 """Seconds that a plan may take beside 1,000 variants."""
@@ -95,7 +95,7 @@ def main(
             "status": lambda: status(task),
             "run": lambda: run(task),
             "cache gc --keep": lambda: Wish(keep=(spec(scenes),)).limits(Path(folder, "cache")),
-            "explain --trace": lambda: ancestry(open_store(task.cache), key),
+            "explain": lambda: ancestry(open_store(task.cache), key),
         }
         seconds = {name: timed_anew(side) for name, side in sides.items()}
         varied = Task(spec(1), settings=("semidense.R=0.123",), cache=Path(folder, "variants"))

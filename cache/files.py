@@ -66,6 +66,9 @@ def in_threads(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
 
     All threads have ended when this returns or raises, so that nothing is written afterwards.
     """
+    items = list(items)
+    if len(items) < 2:  # starting a thread would take longer
+        return [function(item) for item in items]
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(function, items))
 
@@ -114,6 +117,17 @@ def write_synced(path: Path, data: bytes) -> None:
         file.flush()
         os.fsync(file.fileno())
     make_read_only(path)
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file, and its folders, so that whoever sees it sees all of it; it need not be on disk yet."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f"{path.name}.{secrets.token_hex(8)}.partial")
+    try:
+        temporary.write_bytes(data)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def hash_file(path: Path) -> str:

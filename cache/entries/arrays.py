@@ -1,16 +1,12 @@
-"""Create arrays and list their files; check that imported arrays have the format ``Draft`` writes."""
+"""Describe the arrays of an entry and encode their chunks; refuse arrays and regions that cannot be written."""
 
-import json
-import math
 import re
-import struct
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from itertools import product
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from semidense.cache.document import canonical, parse
-from semidense.cache.entries.entry import DATA, Manifest
 from semidense.cache.errors import InvalidArray
 
 if TYPE_CHECKING:
@@ -22,45 +18,6 @@ NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 """The names that arrays can have."""
 ZSTD_LEVEL = 1
 """Higher levels cost more time than they save space on float maps and float16 volumes."""
-LARGEST_CHUNK = 1 << 32
-"""Bytes of one decoded chunk: a reader holds at least one in memory."""
-_FIELDS = {
-    "shape", "data_type", "chunk_grid", "chunk_key_encoding", "fill_value", "codecs", "attributes", "dimension_names",
-    "zarr_format", "node_type", "storage_transformers",
-}  # fmt: skip
-_TYPE = re.compile(r"(?:bool|u?int(8|16|32|64)|float(16|32|64))", re.ASCII)
-_LARGEST_METADATA = 1 << 20
-_MAGIC = 0xFD2FB528
-
-
-def check_arrays(folder: Path, manifest: Manifest, largest: int) -> None:
-    """Refuse an unpacked entry that is not a group of arrays as ``Draft`` writes them.
-
-    Codecs other than bytes and zstd are refused, since a codec is code; so are chunks that would decode to
-    another size than the array's, which bounds what reading can allocate.
-
-    Args:
-        folder: the entry's, its files already compared with the manifest.
-        manifest: its files.
-        largest: bytes of all arrays together, decoded.
-
-    Raises:
-        ValueError: saying what is wrong.
-    """
-    paths = {file.path for file in manifest.files}
-    names = sorted({path.split("/")[1] for path in paths} - {"zarr.json"})
-    group = _metadata(folder / DATA / "zarr.json") if f"{DATA}/zarr.json" in paths else {}
-    if group.get("node_type") != "group" or group.get("zarr_format") != 3 or not names:
-        raise ValueError("its arrays are in no zarr v3 group")
-    expected, total = {f"{DATA}/zarr.json"}, 0
-    for name in names:
-        if f"{DATA}/{name}/zarr.json" not in paths:
-            raise ValueError(f"{name} is no array")
-        total += _check_array(folder, name, paths, expected)
-        if total > largest:
-            raise ValueError(f"its arrays have more than {largest:,} bytes once decoded")
-    if paths != expected:
-        raise ValueError(f"{min(paths ^ expected)} is {'missing' if min(paths ^ expected) in expected else 'no chunk'}")
 
 
 def chunk_paths(shape: Sequence[int], chunks: Sequence[int], region: Sequence[slice] | None = None) -> Iterator[str]:
@@ -71,87 +28,6 @@ def chunk_paths(shape: Sequence[int], chunks: Sequence[int], region: Sequence[sl
         for part, length, chunk in zip(parts, shape, chunks, strict=True)
     ]
     return ("/".join(("c", *map(str, place))) for place in product(*ranges))
-
-
-def _counts(shape: Sequence[int], chunks: Sequence[int]) -> list[int]:
-    """Return how many chunks there are along each dimension."""
-    return [-(-length // chunk) for length, chunk in zip(shape, chunks, strict=True)]
-
-
-def _metadata(path: Path) -> dict[str, Any]:
-    if path.stat().st_size > _LARGEST_METADATA:
-        raise ValueError(f"{path.name} has more than {_LARGEST_METADATA:,} bytes")
-    return parse(path.read_bytes().decode("utf-8"))
-
-
-def _check_array(folder: Path, name: str, paths: set[str], expected: set[str]) -> int:
-    """Check an array's metadata and chunks, add its files to ``expected``; return its bytes once decoded."""
-    about = _metadata(folder / DATA / name / "zarr.json")
-    shape, chunks, item = _geometry(name, about)
-    size, chunk_size = math.prod(shape) * item, math.prod(chunks) * item
-    if chunk_size > LARGEST_CHUNK:
-        sides = " x ".join(map(str, chunks))
-        raise ValueError(f"a chunk of {name} would be {sides} x {item} = {chunk_size:,} bytes, above {LARGEST_CHUNK:,}")
-    count = math.prod(_counts(shape, chunks))
-    if count > len(paths):
-        raise ValueError(f"{name} would have {count:,} chunks, the entry has {len(paths):,} files")
-    expected.add(f"{DATA}/{name}/zarr.json")
-    for chunk in chunk_paths(shape, chunks):
-        path = f"{DATA}/{name}/{chunk}"
-        expected.add(path)
-        if path in paths and (found := _decoded_size(folder / path)) != chunk_size:
-            raise ValueError(f"{path} would decode to {found} bytes, its array says {chunk_size:,}")
-    return size
-
-
-def _geometry(name: str, about: dict[str, Any]) -> tuple[list[int], list[int], int]:
-    """Return shape, chunk shape and bytes an item of an array of the one form that is written here."""
-    codecs = [(codec.get("name"), codec.get("configuration", {})) for codec in _dicts(about.get("codecs"))]
-    match = _TYPE.fullmatch(str(about.get("data_type")))
-    encoding = about.get("chunk_key_encoding")
-    if (
-        set(about) - _FIELDS
-        or (about.get("zarr_format"), about.get("node_type"), about.get("storage_transformers", [])) != (3, "array", [])
-        or match is None
-        or [codec for codec, _ in codecs] != ["bytes", "zstd"]
-        or codecs[0][1] not in ({}, {"endian": "little"})
-        or codecs[1][1].get("checksum") is not True
-        or encoding != {"name": "default", "configuration": {"separator": "/"}}
-        or isinstance(about.get("fill_value"), (list, dict))
-    ):
-        raise ValueError(f"{name} is not an array as this cache writes them: {json.dumps(about)[:80]}")
-    grid = about.get("chunk_grid") or {}
-    shape = _lengths(name, about.get("shape"), 0)
-    chunks = _lengths(name, (grid.get("configuration") or {}).get("chunk_shape"), 1)
-    if grid.get("name") != "regular" or len(shape) != len(chunks):
-        raise ValueError(f"{name} has shape {shape} and chunks {chunks}")
-    return shape, chunks, int(match[1] or match[2] or 8) // 8
-
-
-def _dicts(value: object) -> Iterator[dict[str, Any]]:
-    for item in value if isinstance(value, list) else ():
-        yield item if isinstance(item, dict) else {}
-
-
-def _lengths(name: str, value: object, least: int) -> list[int]:
-    if not isinstance(value, list) or any(type(length) is not int or length < least for length in value):
-        raise ValueError(f"{name} has a shape or chunks that are none")
-    return value
-
-
-def _decoded_size(path: Path) -> int | None:
-    """Return the size that a zstd frame says it decodes to; None if it does not say, or is no frame."""
-    with path.open("rb") as file:
-        head = file.read(18)
-    if len(head) < 6 or struct.unpack_from("<I", head)[0] != _MAGIC:
-        return None
-    flags = head[4]
-    single = flags >> 5 & 1
-    at = 5 + (0 if single else 1) + (0, 1, 2, 4)[flags & 3]
-    width = (1 if single else 0, 2, 4, 8)[flags >> 6]
-    if not width or len(head) < at + width:
-        return None
-    return int.from_bytes(head[at : at + width], "little") + (256 if width == 2 else 0)
 
 
 def require_dtype(name: str, dtype: str) -> "np.dtype[Any]":
@@ -189,33 +65,123 @@ def require_fit(
             raise InvalidArray(f"{where}: {dim} has length {size}, in another array of the draft {sizes[dim]}")
 
 
-def new_array(
-    place: Any,  # noqa: ANN401 - a path, or a place in one of zarr's stores
+def array_metadata(
     shape: Sequence[int],
     kind: "np.dtype[Any]",
     chunks: Sequence[int],
     dims: Sequence[str],
     attrs: Mapping[str, Any],
     fill_value: float | None,
-) -> "zarr.Array[Any]":
-    """Create an array of the one form that this cache writes."""
-    import numpy as np
+) -> bytes:
+    """Return the metadata file of an array of the one form that this cache writes."""
+    cut = tuple(max(1, min(chunk, size)) for chunk, size in zip(chunks, shape, strict=True))
+    if fill_value is not None:  # not remembered: 0.0 and -0.0 are equal, their metadata are not
+        return _spell_metadata(tuple(shape), kind, cut, tuple(dims), canonical(attrs), fill_value)
+    return _metadata_of(tuple(shape), kind, cut, tuple(dims), canonical(attrs))
+
+
+@lru_cache(256)
+def _metadata_of(
+    shape: tuple[int, ...], kind: "np.dtype[Any]", chunks: tuple[int, ...], dims: tuple[str, ...], attrs: str
+) -> bytes:
+    """As ``array_metadata``, once for all arrays of a form: the scenes of a data set share theirs."""
+    return _spell_metadata(shape, kind, chunks, dims, attrs, kind.type("nan" if kind.kind == "f" else 0))
+
+
+def _spell_metadata(
+    shape: tuple[int, ...],
+    kind: "np.dtype[Any]",
+    chunks: tuple[int, ...],
+    dims: tuple[str, ...],
+    attrs: str,
+    fill_value: Any,  # noqa: ANN401 - a number, of Python or NumPy
+) -> bytes:
+    """Have zarr create an array in memory, and return its metadata file."""
     import zarr
     from zarr.codecs import ZstdCodec
+    from zarr.storage import MemoryStore
 
-    return zarr.create_array(
-        place,
+    memory: dict[str, Any] = {}
+    zarr.create_array(
+        MemoryStore(memory),
         zarr_format=3,
-        shape=tuple(shape),
+        shape=shape,
         dtype=kind,
-        chunks=tuple(max(1, min(chunk, size)) for chunk, size in zip(chunks, shape, strict=True)),
+        chunks=chunks,
         filters=(),
         compressors=(ZstdCodec(level=ZSTD_LEVEL, checksum=True),),
-        fill_value=fill_value if fill_value is not None else kind.type(np.nan if kind.kind == "f" else 0),
-        dimension_names=tuple(dims),
-        attributes=parse(canonical(attrs)),
-        config={"write_empty_chunks": True},
+        fill_value=fill_value,
+        dimension_names=dims,
+        attributes=parse(attrs),
     )
+    return bytes(memory["zarr.json"].to_bytes())
+
+
+@lru_cache(1)
+def group_metadata() -> bytes:
+    """Return the metadata file of the group that an entry's arrays are in."""
+    import zarr
+    from zarr.storage import MemoryStore
+
+    memory: dict[str, Any] = {}
+    zarr.create_group(MemoryStore(memory), zarr_format=3)
+    return bytes(memory["zarr.json"].to_bytes())
+
+
+@lru_cache(256)
+def _described(metadata: bytes) -> "zarr.Array[Any]":
+    """Return an array without chunks from its metadata file, to ask for its shape, chunks, type and fill value."""
+    import zarr
+    from zarr.core.buffer import default_buffer_prototype
+    from zarr.storage import MemoryStore
+
+    memory = {"zarr.json": default_buffer_prototype().buffer.from_bytes(metadata)}
+    return zarr.open_array(MemoryStore(memory), mode="r", zarr_format=3)
+
+
+def chunks_of(
+    where: str, metadata: bytes, region: tuple[slice, ...], data: "NDArray[Any]"
+) -> "Iterator[tuple[str, NDArray[Any]]]":
+    """Return each chunk of a region: its path relative to the array's folder, and its values, filled up at the end.
+
+    Args:
+        where: names the array in errors.
+        metadata: the array's metadata file.
+        region: as for ``Draft.write``.
+        data: of the region.
+
+    Raises:
+        InvalidArray: at once, if the region is not made of whole chunks or the data do not fit it.
+    """
+    array = _described(metadata)
+    bounds = require_region(where, array, region, data)
+    steps = [range(0, part.stop - part.start, chunk) for part, chunk in zip(bounds, array.chunks, strict=True)]
+    blocks = (_whole_chunk(array, data[_corner(start, array.chunks)]) for start in product(*steps))
+    return zip(chunk_paths(array.shape, array.chunks, bounds), blocks, strict=True)
+
+
+def _corner(start: Sequence[int], chunks: Sequence[int]) -> tuple[slice, ...]:
+    return tuple(slice(first, first + length) for first, length in zip(start, chunks, strict=True))
+
+
+def _whole_chunk(array: "zarr.Array[Any]", block: "NDArray[Any]") -> "NDArray[Any]":
+    """Return a block in the shape of a chunk: beyond the array's end lies the fill value."""
+    import numpy as np
+
+    if block.shape == array.chunks:
+        return block
+    whole = np.full(array.chunks, array.fill_value, array.dtype)
+    whole[tuple(slice(length) for length in block.shape)] = block
+    return whole
+
+
+def encoded(chunk: "NDArray[Any]") -> bytes:
+    """Return the file of a chunk: the bytes that zarr writes, without a wait for its event loop."""
+    import numpy as np
+    from numcodecs.zstd import Zstd
+
+    plain = np.ascontiguousarray(chunk, chunk.dtype.newbyteorder("<"))
+    return bytes(Zstd(level=ZSTD_LEVEL, checksum=True).encode(plain.reshape(-1).view(np.uint8)))
 
 
 def require_region(

@@ -9,16 +9,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from semidense.cache.entries import publish
-from semidense.cache.entries.arrays import NAME, chunk_paths, new_array, require_dtype, require_fit, require_region
+from semidense.cache.entries.arrays import (
+    NAME,
+    array_metadata,
+    chunk_paths,
+    chunks_of,
+    encoded,
+    group_metadata,
+    require_dtype,
+    require_fit,
+)
 from semidense.cache.entries.backend import Draft
 from semidense.cache.entries.entry import DATA, Entry
 from semidense.cache.errors import IncompleteDraft, InvalidArray
-from semidense.cache.files import writing
+from semidense.cache.files import in_threads, write_whole, writing
 from semidense.cache.layout import Layout
 from semidense.cache.processes.locks import Lock
 
 if TYPE_CHECKING:
-    import zarr
     from numpy.typing import NDArray
 
 _own: dict[str, Lock] = {}
@@ -58,15 +66,16 @@ class FolderDraft(Draft):
         with self._writing():
             require_fit(self.recipe.stage, self._sizes(), name, shape, chunks, dims)
             if not (self.path / DATA / "zarr.json").is_file():
-                self._group()
-            new_array(self.path / DATA / name, shape, kind, chunks, dims, attrs, fill_value)
+                write_whole(self.path / DATA / "zarr.json", group_metadata())
+            write_whole(self._about(name), array_metadata(shape, kind, chunks, dims, attrs, fill_value))
         publish.STEP_HOOK("array created")
 
     def write(self, name: str, region: tuple[slice, ...], data: "NDArray[Any]") -> None:
         """Write one region of an array, see ``Draft``."""
         with self._writing():
-            array = self._array(name)
-            array[require_region(f"array {name!r} of {self.recipe.stage}", array, region, data)] = data
+            chunks = chunks_of(f"array {name!r} of {self.recipe.stage}", self._metadata_of(name), region, data)
+            folder = self.path / DATA / name
+            in_threads(lambda chunk: write_whole(folder / chunk[0], encoded(chunk[1])), chunks)
         publish.STEP_HOOK("chunk written")
 
     def has_array(self, name: str) -> bool:
@@ -135,20 +144,11 @@ class FolderDraft(Draft):
             for name, each in self._metadata().items()
         }
 
-    def _group(self) -> "zarr.Group":
-        """Open the draft's arrays; the group is there from the first of them on."""
-        import zarr
-
-        return zarr.open_group(self.path / DATA, mode="a", zarr_format=3)
-
-    def _array(self, name: str) -> "zarr.Array[Any]":
-        """Open one array so that every chunk written becomes a file, also one that is all fill value."""
-        import zarr
-
-        if not NAME.fullmatch(name) or not (self.path / DATA / name).is_dir():
+    def _metadata_of(self, name: str) -> bytes:
+        """Return the metadata file of one array; InvalidArray if it was not created."""
+        if not self.has_array(name):
             raise InvalidArray(f"{self.recipe.stage} has no array {name!r}: create it before writing")
-        array = zarr.open_array(self.path / DATA / name, mode="r+", zarr_format=3)
-        return array.with_config({"write_empty_chunks": True})  # open_array itself ignores this setting (zarr 3.1)
+        return self._about(name).read_bytes()
 
     def _complete(self) -> list[str]:
         """Return the path of every file of the draft, once each is known to be there."""

@@ -9,7 +9,16 @@ from functools import lru_cache
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
-from semidense.cache.entries.arrays import NAME, chunk_paths, new_array, require_dtype, require_fit, require_region
+from semidense.cache.entries.arrays import (
+    NAME,
+    array_metadata,
+    chunk_paths,
+    chunks_of,
+    encoded,
+    group_metadata,
+    require_dtype,
+    require_fit,
+)
 from semidense.cache.entries.backend import Draft
 from semidense.cache.entries.entry import DATA, MANIFEST, Entry, File, Manifest
 from semidense.cache.errors import DamagedEntry, EntryNotFound, IncompleteDraft, InvalidArray, InvalidKey
@@ -20,7 +29,6 @@ from semidense.cache.objects.near import near
 from semidense.cache.objects.requests import Found, Objects, connect
 
 if TYPE_CHECKING:
-    import zarr
     from numpy.typing import NDArray
 
 GIVEN_UP = b"given up\n"
@@ -81,19 +89,16 @@ class ObjectDraft(Draft):
         """Add an empty array, see ``Draft``."""
         kind = require_dtype(name, dtype)
         require_fit(self.recipe.stage, self._sizes(), name, shape, chunks, dims)
-        memory, place = _memory(name)
-        new_array(place, shape, kind, chunks, dims, attrs, fill_value)
+        metadata = array_metadata(shape, kind, chunks, dims, attrs, fill_value)
         self._announce(name)
-        self._put(f"{DATA}/zarr.json", _group())
-        self._put(f"{DATA}/{name}/zarr.json", memory[f"{name}/zarr.json"].to_bytes())
+        self._put(f"{DATA}/zarr.json", group_metadata())
+        self._put(f"{DATA}/{name}/zarr.json", metadata)
 
     def write(self, name: str, region: tuple[slice, ...], data: "NDArray[Any]") -> None:
         """Write one region of an array, see ``Draft``."""
         self._require_exists()
-        memory, array = self._encoder(name)
-        array[require_region(f"array {name!r} of {self.recipe.stage}", array, region, data)] = data
-        chunks = [path for path in memory if path.startswith(f"{name}/c")]
-        in_threads(lambda path: self._put(f"{DATA}/{path}", memory[path].to_bytes()), chunks)
+        chunks = chunks_of(f"array {name!r} of {self.recipe.stage}", self._metadata_of(name), region, data)
+        in_threads(lambda chunk: self._put(f"{DATA}/{name}/{chunk[0]}", encoded(chunk[1])), chunks)
 
     def has_array(self, name: str) -> bool:
         """Return whether ``create_array`` made an array of this name."""
@@ -209,18 +214,11 @@ class ObjectDraft(Draft):
         chunks = chunk_paths(about["shape"], about["chunk_grid"]["configuration"]["chunk_shape"], region)
         return [f"{DATA}/{name}/{path}" for path in chunks]
 
-    def _encoder(self, name: str) -> tuple[dict[str, Any], "zarr.Array[Any]"]:
-        """Return an array whose chunks are encoded as everywhere, and the mapping that they are put into."""
-        import zarr
-        from zarr.core.buffer import default_buffer_prototype
-
-        about = self._about(name) if NAME.fullmatch(name) else None
-        if about is None:
+    def _metadata_of(self, name: str) -> bytes:
+        """Return the metadata file of one array; InvalidArray if it was not created."""
+        if not self.has_array(name):
             raise InvalidArray(f"{self.recipe.stage} has no array {name!r}: create it before writing")
-        memory, place = _memory(name)
-        memory[f"{name}/zarr.json"] = default_buffer_prototype().buffer.from_bytes(json.dumps(about).encode("ascii"))
-        array = zarr.open_array(place, mode="r+", zarr_format=3)
-        return memory, array.with_config({"write_empty_chunks": True})
+        return _known(self.url, self._path(f"{DATA}/{name}/zarr.json")).encode("utf-8")
 
     def _manifest(self) -> Manifest:
         """Return the manifest of every file of the draft, once each is known to be there."""
@@ -296,23 +294,3 @@ def _metadata(url: str, path: str) -> dict[str, Any] | None:
     except KeyError:
         return None
     return about
-
-
-def _memory(name: str) -> tuple[dict[str, Any], Any]:
-    """Return a mapping of zarr's buffers, and the place of an array in the store that writes into it."""
-    from zarr.storage import MemoryStore, StorePath
-
-    memory: dict[str, Any] = {}
-    return memory, StorePath(MemoryStore(memory), name)
-
-
-@lru_cache(1)
-def _group() -> bytes:
-    """Return the metadata of the group that an entry's arrays are in."""
-    import zarr
-    from zarr.storage import MemoryStore
-
-    memory: dict[str, Any] = {}
-    zarr.create_group(MemoryStore(memory), zarr_format=3)
-    data: bytes = memory["zarr.json"].to_bytes()
-    return data

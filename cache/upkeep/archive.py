@@ -25,13 +25,13 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO, Literal
 
 from semidense.cache.entries import publish
-from semidense.cache.entries.arrays import check_arrays
 from semidense.cache.entries.check import inspect
 from semidense.cache.entries.entry import MANIFEST, Entry, Manifest
 from semidense.cache.entries.folder import FolderBackend
 from semidense.cache.errors import CacheError, CacheUnavailable, DamagedArchive, DamagedEntry, NonDeterministicStage
 from semidense.cache.files import make_folder, remove, sync, writing
 from semidense.cache.store import Store
+from semidense.cache.upkeep.imported_arrays import check_arrays
 
 LARGEST = 1 << 40
 """Bytes of one entry, stored or decoded; more is refused before anything is written."""

@@ -77,7 +77,7 @@ def workers_on_little() -> None:
     [
         pytest.param(aggregation_on_little, "aggregation", "peak of aggregation", id="aggregation"),
         pytest.param(growth_on_little, "growth", "time a cell", id="growth"),
-        pytest.param(many_scenes_on_little, "many_scenes", "explain --trace", id="many scenes"),
+        pytest.param(many_scenes_on_little, "many_scenes", "explain", id="many scenes"),
         pytest.param(memory_on_little, "memory", "peak of a run", id="memory"),
         pytest.param(own_pairs_on_little, "own_pairs", "each further pair", id="own pairs"),
         pytest.param(training_on_little, "training", "times patches", id="training"),
