@@ -19,6 +19,8 @@ T = TypeVar("T")
 R = TypeVar("R")
 THREADS = 4
 """Threads that read, hash and sync: enough to hide the disk's latency."""
+_SMALL = 1 << 18
+"""Bytes of a file that are hashed in one piece: making a buffer for more takes longer than hashing a small file."""
 
 _ADVICE = {
     errno.ENOSPC: "free some space, or choose another cache folder",
@@ -130,10 +132,13 @@ def write_whole(path: Path, data: bytes) -> None:
         temporary.unlink(missing_ok=True)
 
 
-def hash_file(path: Path) -> str:
+def hash_file(path: str | Path) -> str:
     """Return the sha256 of a file's bytes, in hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    with open(path, "rb") as file:  # noqa: PTH123 - a Path for each of thousands of small files costs more than hashing
+        sha256 = hashlib.sha256(head := file.read(_SMALL))
+        if len(head) == _SMALL:
+            hashlib.file_digest(file, lambda: sha256)
+    return sha256.hexdigest()
 
 
 def make_read_only(path: Path) -> None:

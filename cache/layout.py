@@ -76,11 +76,11 @@ class Layout:
 
     def record(self, key: str) -> Path:
         """Return the file whose existence makes the entry exist."""
-        return self.root / "records" / require_key(key)[:2] / f"{key}.json"
+        return self.root.joinpath("records", require_key(key)[:2], f"{key}.json")
 
     def entry(self, key: str) -> Path:
         """Return the folder of the entry's manifest and data."""
-        return self.entries / require_key(key)[:2] / key
+        return self.root.joinpath("entries", require_key(key)[:2], key)
 
     def lock(self, name: str, key: str) -> Path:
         """Return the file of one of the key's locks."""

@@ -155,7 +155,7 @@ def _hash(path: str, remember: bool) -> str | None:
     """Return a file's sha256, and keep it if a later change of the file is sure to show; None if the disk fails."""
     before, now = _fingerprint(path), time.time()
     try:
-        sha256 = hash_file(Path(path))
+        sha256 = hash_file(path)
     except OSError as error:
         if error.errno == errno.EIO:
             return None

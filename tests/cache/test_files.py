@@ -1,4 +1,5 @@
 import errno
+import hashlib
 import os
 import subprocess
 import sys
@@ -7,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from semidense.cache.errors import CacheUnavailable, DamagedEntry
-from semidense.cache.files import in_threads, make_folder, remove, walk, write_synced, writing
+from semidense.cache.files import hash_file, in_threads, make_folder, remove, walk, write_synced, write_whole, writing
 
 
 @pytest.mark.parametrize(
@@ -69,3 +70,26 @@ def test_importing_the_cache_is_light() -> None:
     project = Path(__file__).parents[2]
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=project, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("size", [0, 1, (1 << 18) - 1, 1 << 18, (1 << 18) + 1, (1 << 20) + 3])
+def test_every_byte_of_a_file_is_hashed(tmp_path: Path, size: int) -> None:
+    data = bytearray(os.urandom(size))
+    (tmp_path / "file").write_bytes(data)
+    assert hash_file(tmp_path / "file") == hash_file(f"{tmp_path}/file") == hashlib.sha256(data).hexdigest()
+    if size:
+        data[-1] ^= 1
+        assert hash_file(tmp_path / "file") != hashlib.sha256(data).hexdigest()
+
+
+def test_a_whole_file_replaces_the_former_one(tmp_path: Path) -> None:
+    for text in (b"old", b"new"):
+        write_whole(tmp_path / "folder/file", text)
+    assert [(path.name, path.read_bytes()) for path in (tmp_path / "folder").iterdir()] == [("file", b"new")]
+
+
+def test_a_whole_file_that_cannot_take_its_place_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "file/inside").mkdir(parents=True)
+    with pytest.raises(OSError, match="file"):
+        write_whole(tmp_path / "file", b"data")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
