@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from zarr.abc.store import ByteRequest
     from zarr.core.buffer import Buffer, BufferPrototype
 
+_AT_ONCE = 1 << 16
+"""Bytes of a file that is read at once: handing it to one of zarr's threads takes longer."""
+
 
 def files_by_name(manifest: Manifest) -> dict[str, File]:
     """Return the files of a manifest by the names that zarr has for them."""
@@ -81,6 +84,8 @@ class EntryStore(Listing, LocalStore):
         """Return the bytes of a file of the manifest; None if the manifest lists none."""
         if key not in self._sizes:
             return None
+        if self._sizes[key] <= _AT_ONCE:
+            return self.get_sync(key, prototype=prototype, byte_range=byte_range)
         return self._require(key, await super().get(key, prototype, byte_range), byte_range)
 
     def get_sync(

@@ -335,3 +335,25 @@ def test_every_look_at_opened_files_goes_through_the_manifest(
             await group.get_partial_values(default_buffer_prototype(), [("map/c/1/0", part)])
 
     asyncio.run(look())
+
+
+@pytest.mark.parametrize(
+    "at_once", [pytest.param(0, id="in one of zarr's threads"), pytest.param(1 << 16, id="at once")]
+)
+def test_a_file_that_vanishes_or_changes_its_size_while_its_entry_is_open_is_damage(
+    store: Store, make: Callable[..., Entry], recipe: Recipe, monkeypatch: pytest.MonkeyPatch, at_once: int
+) -> None:
+    make(store)
+    monkeypatch.setattr("semidense.cache.entries.reader._AT_ONCE", at_once)
+    array, expected = store.arrays(recipe.key)["map"], store.read(recipe.key)["map"]
+    np.testing.assert_array_equal(array[...], expected)
+    chunk = store.layout.entry(recipe.key) / "data.zarr/map/c/1/0"
+    data = chunk.read_bytes()
+    chunk.chmod(0o644)
+    chunk.parent.chmod(0o755)
+    chunk.write_bytes(data[:-1])
+    with pytest.raises(DamagedEntry, match="changed or vanished"):
+        array[...]
+    chunk.unlink()
+    with pytest.raises(DamagedEntry, match="changed or vanished"):
+        array[...]
