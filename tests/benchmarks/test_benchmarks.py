@@ -90,7 +90,8 @@ def test_runs(
     run()
     assert told in capsys.readouterr().out
     found = json.loads((tmp_path / "build" / "bench" / f"{name}.json").read_text())
-    assert found["name"] == name and all(pair > 0 for ratio in found["ratios"] for pair in ratio["pairs"])
+    least = -np.inf if name == "own_pairs" else 0  # of pairs this small, a further one may cost less than chance
+    assert found["name"] == name and all(least < pair < np.inf for ratio in found["ratios"] for pair in ratio["pairs"])
 
 
 def test_the_matchers_are_told_with_their_errors_and_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
