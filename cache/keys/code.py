@@ -10,21 +10,25 @@ file changed since this process began is refused.
 """
 
 import ast
-import hashlib
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
-from threading import RLock
-from typing import Any, TypeGuard
 
 from semidense.cache.document import digest
 from semidense.cache.errors import EditedSource, SourceNotFound
 from semidense.cache.keys.imported import Stamp, process_start, stamp_of
-
-_PARSING = RLock()
+from semidense.cache.keys.trees import (
+    is_for_checkers,
+    literal_import,
+    parsed,
+    running,
+    source_hash,
+    tree_hash,
+    without_docstrings,
+)
 
 
 @dataclass(frozen=True)
@@ -120,38 +124,6 @@ def require_imported_as_hashed(modules: Iterable[str]) -> None:
         _settled.add(name)
 
 
-def _parsed(text: str | bytes) -> ast.Module:
-    """Return a source's syntax tree, made by one thread at a time: Python 3.11 fails now and then when two make one."""
-    with _PARSING:
-        return ast.parse(text)
-
-
-def bare_tree(text: str | bytes) -> ast.AST:
-    """Return a source's syntax tree without docstrings, all that its hash is over.
-
-    Raises:
-        SyntaxError, ValueError: if it is no Python.
-    """
-    tree: ast.AST = _Bare().visit(_parsed(text))
-    return tree
-
-
-def source_hash(text: str | bytes) -> str:
-    """Return the hash of a source: over its syntax tree without comments, docstrings and positions.
-
-    >>> source_hash("x = 1") == source_hash("x  =  1  # one")
-    True
-
-    Raises:
-        SyntaxError, ValueError: if it is no Python.
-    """
-    return _tree_hash(bare_tree(text))
-
-
-def _tree_hash(bare: ast.AST) -> str:
-    return hashlib.sha256(ast.dump(bare).encode("utf-8", "surrogatepass")).hexdigest()
-
-
 def _parents(module: str) -> Iterator[str]:
     """Return the module and the packages that it is in: importing it runs them all."""
     parts = module.split(".")
@@ -209,8 +181,8 @@ def _read(module: _Module) -> _Source:
     file, is_imported = module.file or Path(), module.name in sys.modules
     try:
         stamp, data = stamp_of(file), file.read_bytes()
-        tree = _parsed(data)
-        imports, hashed = frozenset(_imports(tree, module)), _tree_hash(_Bare().visit(tree))
+        tree = parsed(data)
+        imports, hashed = frozenset(_imports(tree, module)), tree_hash(without_docstrings(tree))
     except (OSError, SyntaxError, ValueError, RecursionError) as error:
         raise SourceNotFound(f"cannot read the source {module.file}: {error}") from error
     if is_imported:
@@ -224,21 +196,9 @@ def _edited(file: Path) -> str:
     return f"{file} was edited since this Python began, and may have been imported before: restart Python (the kernel)"
 
 
-class _Bare(ast.NodeTransformer):
-    """Drop statements that are only text: docstrings, and the notes under an assignment."""
-
-    def visit(self, node: ast.AST) -> Any:  # noqa: ANN401 - what the other methods return
-        """Visit statements alone: no expression holds one, and expressions are most of a tree."""
-        return node if isinstance(node, ast.expr) else super().visit(node)
-
-    def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
-        """Drop the statement if it is a text, and look no deeper otherwise."""
-        return None if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str) else node
-
-
 def _imports(tree: ast.AST, module: _Module) -> Iterator[str]:
     """Yield each dotted name that might be a module imported here; names of other things do no harm."""
-    for node in _running(tree):
+    for node in running(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield from (alias.name, *_offered(alias.name).values())
@@ -247,7 +207,7 @@ def _imports(tree: ast.AST, module: _Module) -> Iterator[str]:
             yield base
             for alias in node.names:
                 yield from _submodules(base) if alias.name == "*" else _named(base, alias.name)
-        elif isinstance(node, ast.Call) and (name := _literal_import(node)):
+        elif isinstance(node, ast.Call) and (name := literal_import(node)):
             yield _absolute(name, module)
 
 
@@ -258,23 +218,6 @@ def _named(base: str, name: str) -> Iterator[str]:
     yield from [home] if (home := _offered(base).get(name)) else []
 
 
-def _running(tree: ast.AST) -> Iterator[ast.AST]:
-    """Yield the nodes of a tree that may run: not what is there for type checkers alone."""
-    waiting = list(ast.iter_child_nodes(tree))
-    while waiting:
-        node = waiting.pop()
-        if _for_checkers(node):
-            waiting += node.orelse
-        else:
-            yield node
-            waiting += ast.iter_child_nodes(node)
-
-
-def _for_checkers(node: ast.AST) -> TypeGuard[ast.If]:
-    test = node.test if isinstance(node, ast.If) else None
-    return getattr(test, "attr", getattr(test, "id", None)) == "TYPE_CHECKING"
-
-
 @cache
 def _offered(package: str) -> Mapping[str, str]:
     """Return the names that a package imports when they are used, with the modules that they come from."""
@@ -282,10 +225,10 @@ def _offered(package: str) -> Mapping[str, str]:
     if not located or not located.file or not located.folders:
         return {}
     try:
-        tree = _parsed(located.file.read_bytes())
+        tree = parsed(located.file.read_bytes())
     except (OSError, SyntaxError, ValueError):
         return {}  # reading the package itself says what is wrong
-    blocks = (node.body for node in tree.body if _for_checkers(node))
+    blocks = (node.body for node in tree.body if is_for_checkers(node))
     nodes = [node for body in blocks for node in body if isinstance(node, ast.ImportFrom)]
     named = [(alias, "." * node.level + (node.module or "")) for node in nodes for alias in node.names]
     return {alias.asname or alias.name: _absolute(module, located) for alias, module in named}
@@ -297,14 +240,6 @@ def _absolute(name: str, module: _Module) -> str:
         return resolve_name(name, module.package)
     except ImportError as error:
         raise SourceNotFound(f"{module.file} imports {name!r}: {error}") from error
-
-
-def _literal_import(call: ast.Call) -> str | None:
-    """Return the name in ``import_module("name")`` or ``__import__("name")``."""
-    called = getattr(call.func, "attr", getattr(call.func, "id", None))
-    if called not in ("import_module", "__import__") or not call.args or not isinstance(call.args[0], ast.Constant):
-        return None
-    return call.args[0].value if isinstance(call.args[0].value, str) else None
 
 
 def _submodules(package: str) -> Iterator[str]:

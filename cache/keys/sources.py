@@ -14,7 +14,8 @@ from dataclasses import dataclass
 
 from semidense.cache.errors import CacheError
 from semidense.cache.files import make_folder, remove
-from semidense.cache.keys.code import bare_tree, module_hash, source_hash, source_text
+from semidense.cache.keys.code import module_hash, source_text
+from semidense.cache.keys.trees import bare_tree, source_hash
 from semidense.cache.layout import Layout
 
 LONGEST = 1 << 20

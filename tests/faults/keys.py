@@ -11,7 +11,7 @@ from typing import Any
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from semidense.cache.keys.code import source_hash
+from semidense.cache.keys.trees import source_hash
 from semidense.datasets.scene import DisparityRange, SceneSource
 from semidense.pipeline.plan.building import build
 from semidense.pipeline.plan.config import CHOICES, Config

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from semidense.cache.errors import SourceNotFound
-from semidense.cache.keys.code import _locate, _parts, _read, code_parts, source_hash
+from semidense.cache.keys.code import _locate, _parts, _read, code_parts
+from semidense.cache.keys.trees import source_hash
 
 Tree = Callable[..., str]
 _numbers = itertools.count()

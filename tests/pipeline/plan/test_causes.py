@@ -57,7 +57,8 @@ def with_code(code: str) -> Graph:
 
 
 def test_a_change_of_code_names_file_function_and_lines(toy_run: ToyRun, toy_plan: ToyPlan, store: Store) -> None:
-    from semidense.cache.keys.code import source_hash, source_text
+    from semidense.cache.keys.code import source_text
+    from semidense.cache.keys.trees import source_hash
 
     text = source_text("semidense.cache.keys.recipe")
     assert text
