@@ -48,9 +48,7 @@ def with_folds(config: Config, names: Sequence[str]) -> Config:
     share = 1 - 1 / len(set(folds))
     sections = {stage.product: config.section(stage.product) for stage in STAGES.values() if stage.learnt}
     nets = {name: net for name, net in sections.items() if isinstance(net, Schedule)}
-    update: dict[str, Params] = {
-        name: net.model_copy(update={"steps": max(1, round(net.steps * share))}) for name, net in nets.items()
-    }
+    update: dict[str, Params] = {name: net.shortened(share) for name, net in nets.items()}
     update["calibration"] = params.model_copy(update={"fold_of_scene": folds})
     update["training"] = config.training.model_copy(update={"shipped": ()})
     update["weights"] = type(config.section("weights"))()

@@ -1,7 +1,8 @@
 """How long and how fast a network learns: the part of their settings that both networks share."""
 
+from collections.abc import Sequence
 from math import cos, pi
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import Field
 
@@ -25,6 +26,15 @@ class Schedule(Params):
     )
     clip: float = Field(1.0, gt=0, description="largest norm of the gradient; a larger one is scaled down")
     checkpoint_steps: int = Field(50, ge=1, description="steps between two checkpoints", exclude=True)
+
+    @property
+    def parts(self) -> Sequence["Schedule"]:
+        """The schedules that the steps follow, one after the other: here only this one."""
+        return (self,)
+
+    def shortened(self, share: float) -> Self:
+        """Return the same schedule with a share of its steps, one at least."""
+        return self.model_copy(update={"steps": max(1, round(self.steps * share))})
 
     def rate(self, step: int) -> float:
         """Return the learning rate of a step: it rises in proportion, and falls from the peak along half a cosine."""

@@ -46,7 +46,7 @@ def fit(net: nn.Module, loss: Loss, schedule: Schedule, monitor: Monitor) -> NDA
     Args:
         net: the network; its parameters are changed.
         loss: the loss of one shard of one step.
-        schedule: steps, rates and clipping.
+        schedule: steps, rates and clipping. Each of its parts begins with optimisers that remember nothing.
         monitor: told of progress, keeps and gives back checkpoints.
 
     Returns:
@@ -58,13 +58,16 @@ def fit(net: nn.Module, loss: Loss, schedule: Schedule, monitor: Monitor) -> NDA
     parameters = list(net.parameters())
     optimisers = optimisers_of(net, schedule)
     curve = _resume(net, optimisers, monitor.load())
+    rates = [(part.rate(step), step == 0) for part in schedule.parts for step in range(part.steps)]
     with ThreadPoolExecutor(SHARDS, initializer=keep_one_thread) as pool:
-        for step in range(len(curve), schedule.steps):
+        for step in range(len(curve), len(rates)):
+            rate, begins = rates[step]
+            optimisers = optimisers_of(net, schedule) if begins else optimisers
             value, gradients = _gradients(parameters, loss, step, pool)
             curve.append(value)
             # In the pool, where an operation has one thread: how many share a sum decides its last bits.
-            pool.submit(_update, parameters, gradients, optimisers, schedule.clip, schedule.rate(step)).result()
-            monitor.progress(step + 1, schedule.steps, f"loss {np.mean(curve[-50:]):.4f}")
+            pool.submit(_update, parameters, gradients, optimisers, schedule.clip, rate).result()
+            monitor.progress(step + 1, len(rates), f"loss {np.mean(curve[-50:]):.4f}")
             if (step + 1) % schedule.checkpoint_steps == 0:
                 monitor.save(_checkpoint(net, optimisers, curve))
     return np.array(curve, np.float32)

@@ -87,19 +87,20 @@ def cut_crop(
     rows = np.arange(y - radius, y + truth.shape[0] + radius)
     columns = np.arange(x - radius, x + truth.shape[1] + radius)
     reach = np.arange(columns[0] - slots.max(), columns[-1] - slots.min() + 1)
-    left = relight(_cut(views[0], rows, columns), strength, rng)
-    strip = relight(_cut(views[1], rows, reach), strength, rng)
+    left = relight(cut(views[0], rows, columns), strength, rng)
+    strip = relight(cut(views[1], rows, reach), strength, rng)
     labels = label_cells(truth, slots, x, views.shape[3])
-    return Crop(_tensor(left), _tensor(strip), (slots.max() - slots).astype(np.int64), torch.from_numpy(labels))
+    return Crop(to_tensor(left), to_tensor(strip), (slots.max() - slots).astype(np.int64), torch.from_numpy(labels))
 
 
-def _cut(view: NDArray[np.float32], rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float32]:
+def cut(view: NDArray[np.float32], rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float32]:
     """Return rows and columns of a view; beyond the image the nearest pixel, as in the cost volume."""
     height, width = view.shape[1:]
     return view[:, np.clip(rows, 0, height - 1)[:, None], np.clip(columns, 0, width - 1)]
 
 
-def _tensor(view: NDArray[np.float32]) -> Tensor:
+def to_tensor(view: NDArray[np.float32]) -> Tensor:
+    """Return a view (channel, y, x) as a batch of one, as the networks take it."""
     return torch.from_numpy(np.ascontiguousarray(view)).unsqueeze(0).contiguous(memory_format=torch.channels_last)
 
 

@@ -150,14 +150,14 @@ def _follow_row(
     for column in range(width):
         x = width - 1 - column if backwards else column
         own, other = x + margin, x - dx + margin
-        edge = _is_edge(gray, y, x, y - dy, x - dx, edge_step)
+        edge = is_edge(gray, y, x, y - dy, x - dx, edge_step)
         least_now[own] = _extend(
             before, other, now, own, least_before[other], table[edge, 0], table[edge, 1], above, sums, x
         )
 
 
 @kernel
-def _is_edge(gray: NDArray[np.uint8], y: int, x: int, v: int, u: int, edge_step: int) -> int:
+def is_edge(gray: NDArray[np.uint8], y: int, x: int, v: int, u: int, edge_step: int) -> int:
     """Return 1 if the gray of two pixels differs by more than a step, 0 if not or if (v, u) is outside the image."""
     if not (0 <= v < gray.shape[0] and 0 <= u < gray.shape[1]):
         return 0

@@ -16,21 +16,21 @@ from semidense.stages.learning.scenes import Scenes
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import fit
 from semidense.stages.matching.crops import Crop, cells_loss, cut_crop, measure_channels
-from semidense.stages.matching.declaration import REACH, DescriptorNetParams, MatchingSamples, OfSamples
+from semidense.stages.matching.declaration import REACH, DescriptorNetParams, MatchingSamples, OfSummed
 from semidense.stages.matching.descriptors.net import DescriptorNet
-from semidense.stages.matching.descriptors.transformed import kernels_of, transformed_descriptors
-from semidense.stages.matching.descriptors.transformed_training import differentiable
+from semidense.stages.matching.descriptors.summed import cut_wide_crop, summed_loss, wide_scenes
+from semidense.stages.matching.descriptors.transformed_training import describer
 from semidense.stages.matching.descriptors.volume import diagonals
 from semidense.stages.matching.samples import ABSENT
 from semidense.stages.stage import Monitor, Network, Silent, by_scene
 
 
-def train_descriptor_net(params: DescriptorNetParams, inputs: OfSamples, monitor: Monitor | None = None) -> Network:
-    """Train a descriptor-Net from nothing.
+def train_descriptor_net(params: DescriptorNetParams, inputs: OfSummed, monitor: Monitor | None = None) -> Network:
+    """Train a descriptor-Net from nothing: first on single cells, then, if asked for, on costs summed along paths.
 
     Args:
         params: schedule and augmentation.
-        inputs: as for ``train_matching_net``.
+        inputs: as for ``train_matching_net``; with ``summed_steps`` also ``images`` and ``truth`` of every scene.
         monitor: progress and checkpoints.
 
     Returns:
@@ -44,8 +44,12 @@ def train_descriptor_net(params: DescriptorNetParams, inputs: OfSamples, monitor
     samples = inputs["matching_samples"]
     slots = {int(scene): _range(samples, scene) for scene in np.unique(samples["scene"])}
 
+    wide = wide_scenes(inputs) if params.summed_steps else None
+
     def loss(step: int, shard: int) -> Tensor:
         rng = np.random.default_rng((params.seed, step, shard))
+        if wide and step >= params.steps:
+            return summed_loss(net, cut_wide_crop(params, samples, wide, rng), params.precision)
         first = step * params.batch + shard
         chosen = [index % len(samples["scene"]) for index in range(first, (step + 1) * params.batch, SHARDS)]
         crops = [
@@ -62,18 +66,12 @@ def train_descriptor_net(params: DescriptorNetParams, inputs: OfSamples, monitor
 
 def crops_logits(net: DescriptorNet, crops: Sequence[Crop], precision: Precision = "float32") -> list[Tensor]:
     """Return the logits (slot, 2, y, x) of each crop, compared at consecutive disparities, in ascending order."""
-    kernels = kernels_of(net) if precision == "float32" else None
-    return [_logits(net, kernels, crop) for crop in crops]
+    describe = describer(net, precision)
+    return [_logits(net, describe(crop.left), describe(crop.strip), len(crop.starts)) for crop in crops]
 
 
-def _logits(net: DescriptorNet, kernels: Sequence[Tensor] | None, crop: Crop) -> Tensor:
-    left, strip = (
-        net(view)[0].permute(1, 2, 0)
-        if kernels is None
-        else transformed_descriptors(net, kernels, view[0], differentiable)
-        for view in (crop.left, crop.strip)
-    )
-    mismatch = net.log_odds(diagonals(left @ strip.mT, len(crop.starts))).flip(2).permute(2, 0, 1)
+def _logits(net: DescriptorNet, left: Tensor, strip: Tensor, slots: int) -> Tensor:
+    mismatch = net.log_odds(diagonals(left @ strip.mT, slots)).flip(2).permute(2, 0, 1)
     return torch.stack([torch.zeros_like(mismatch), mismatch], 1)
 
 

@@ -3,6 +3,7 @@
 The transformed tiles of a layer are made again, which is cheaper than to keep them.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from semidense.stages.compute.kernel import inlined, kernel
-from semidense.stages.matching.descriptors.net import WIDTH
-from semidense.stages.matching.descriptors.transformed import TILES, convolved, corner, six_pixels, split
+from semidense.stages.compute.precision import Precision
+from semidense.stages.matching.descriptors.net import WIDTH, DescriptorNet
+from semidense.stages.matching.descriptors.transformed import (
+    TILES,
+    convolved,
+    corner,
+    kernels_of,
+    six_pixels,
+    split,
+    transformed_descriptors,
+)
 from semidense.stages.matching.winograd.storage import Flat
 from semidense.stages.matching.winograd.tiles import (
     TILE,
@@ -71,6 +81,14 @@ def _split_transposed(tiles: NDArray[np.float32], first: int, step: int, gradien
                 pixels[3][c] += six[3]
                 pixels[4][c] += six[4]
                 pixels[5][c] += six[5]
+
+
+def describer(net: DescriptorNet, precision: Precision) -> Callable[[Tensor], Tensor]:
+    """Return what gives a view (1, channel, y + 16, x + 16) its descriptors (y, x, 64) in training, differentiable."""
+    if precision != "float32":
+        return lambda view: net(view)[0].permute(1, 2, 0)
+    kernels = kernels_of(net)
+    return lambda view: transformed_descriptors(net, kernels, view[0], differentiable)
 
 
 def differentiable(maps: Tensor, weight: Tensor, bias: Tensor, floor: float, step: int) -> Tensor:
