@@ -17,7 +17,7 @@ from semidense.stages.disparity.aggregation.differentiable import path_sums
 from semidense.stages.disparity.declaration import AggregatedParams
 from semidense.stages.learning.augmentation import relight
 from semidense.stages.learning.scenes import Scenes
-from semidense.stages.matching.crops import cut, to_tensor
+from semidense.stages.matching.crops import Channels, cut, to_tensor
 from semidense.stages.matching.declaration import REACH, DescriptorNetParams, MatchingSamples, OfSummed
 from semidense.stages.matching.descriptors.net import DescriptorNet
 from semidense.stages.matching.descriptors.transformed_training import describer
@@ -38,16 +38,14 @@ FLOOR = 0.01
 
 @dataclass(frozen=True)
 class WideScene:
-    """What is needed of one training scene, upright or mirrored.
+    """What is needed of one training scene beside its channels, upright or mirrored.
 
     Attributes:
-        views: (view, channel, y, x).
         gray: (y, x) uint8 of the left view.
         truth: (y, x) px, NaN where it is unknown or not both views see the pixel.
         disparities: the scene's range.
     """
 
-    views: NDArray[np.float32]
     gray: NDArray[np.uint8]
     truth: NDArray[np.float32]
     disparities: range
@@ -55,7 +53,7 @@ class WideScene:
     @property
     def nbytes(self) -> int:
         """What keeping it takes."""
-        return self.views.nbytes + self.gray.nbytes + self.truth.nbytes
+        return self.gray.nbytes + self.truth.nbytes
 
 
 @dataclass(frozen=True)
@@ -85,32 +83,38 @@ def wide_scenes(inputs: OfSummed) -> Scenes[WideScene]:
     """
     if "images" not in inputs or "truth" not in inputs:
         raise StageError("learning from summed costs needs the images and the truth of every training scene")
-    channels, images, truths = inputs["channels"], inputs["images"], inputs["truth"]
+    images, truths = inputs["images"], inputs["truth"]
 
     def scene(number: int) -> WideScene:
         place, mirrored = divmod(number, 2)
         low, high = (int(end) for end in truths[place]["range"])
-        views, gray = channels[place]["channels"], to_gray(images[place]["right" if mirrored else "left"])
-        if mirrored:
-            views, gray = views[::-1, :, :, ::-1], np.ascontiguousarray(gray[:, ::-1])
-        return WideScene(views, gray, visible_truth(truths[place], bool(mirrored)), range(low, high + 1))
+        gray = to_gray(images[place]["right" if mirrored else "left"])
+        gray = np.ascontiguousarray(gray[:, ::-1]) if mirrored else gray
+        return WideScene(gray, visible_truth(truths[place], bool(mirrored)), range(low, high + 1))
 
-    return Scenes(scene, 2 * len(channels))
+    return Scenes(scene, 2 * len(truths))
 
 
 def cut_wide_crop(
-    params: DescriptorNetParams, samples: MatchingSamples, scenes: Scenes[WideScene], rng: np.random.Generator
+    params: DescriptorNetParams,
+    samples: MatchingSamples,
+    channels: Channels,
+    scenes: Scenes[WideScene],
+    rng: np.random.Generator,
 ) -> WideCrop:
     """Cut a crop around a random sample, with another light on each view.
 
     Args:
         params: size of the crop and strength of the lighting.
         samples: arrays as ``draw_samples`` makes them; they say how often each scene comes.
+        channels: float32 (view, channel, y, x) of each training scene.
         scenes: as ``wide_scenes`` returns them.
         rng: source of the choice and the lighting.
     """
     index = int(rng.integers(len(samples["scene"])))
-    scene = scenes[2 * int(samples["scene"][index]) + int(samples["mirrored"][index])]
+    place, mirrored = int(samples["scene"][index]), bool(samples["mirrored"][index])
+    scene = scenes[2 * place + mirrored]
+    views = channels[place][::-1, :, :, ::-1] if mirrored else channels[place]
     height, width = scene.truth.shape
     size = min(params.summed_height, height), min(params.summed_width, width)
     middle = (int(samples["y"][index]), int(samples["x"][index]))
@@ -119,7 +123,7 @@ def cut_wide_crop(
     reach = np.arange(columns[0] - scene.disparities[-1], columns[-1] - scene.disparities[0] + 1)
     left, strip = (
         to_tensor(relight(cut(view, rows, across), params.relight, rng))
-        for view, across in zip(scene.views, (columns, reach), strict=True)
+        for view, across in zip(views, (columns, reach), strict=True)
     )
     inside = np.s_[y : y + size[0], x : x + size[1]]
     matched = np.arange(x, x + size[1])[:, None] - np.array(scene.disparities)

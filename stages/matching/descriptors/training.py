@@ -49,7 +49,7 @@ def train_descriptor_net(params: DescriptorNetParams, inputs: OfSummed, monitor:
     def loss(step: int, shard: int) -> Tensor:
         rng = np.random.default_rng((params.seed, step, shard))
         if wide and step >= params.steps:
-            return summed_loss(net, cut_wide_crop(params, samples, wide, rng), params.precision)
+            return summed_loss(net, cut_wide_crop(params, samples, scenes, wide, rng), params.precision)
         first = step * params.batch + shard
         chosen = [index % len(samples["scene"]) for index in range(first, (step + 1) * params.batch, SHARDS)]
         crops = [

@@ -28,6 +28,10 @@ def inputs(scene: dict[str, dict], **settings: object) -> dict[str, object]:
     }
 
 
+def channels(given: dict[str, object]) -> list[np.ndarray]:
+    return [scene["channels"] for scene in given["channels"]]
+
+
 def settings(**changes: object) -> DescriptorNetParams:
     plain = {"steps": 2, "batch": 2, "precision": "float32", "relight": 0.0, "summed_steps": 3}
     return DescriptorNetParams.model_validate(plain | {"summed_height": 24, "summed_width": 40} | changes)
@@ -39,7 +43,9 @@ def test_a_crop_as_large_as_the_image_has_the_sums_of_its_map(mirrored: bool) ->
     given = inputs(scene)
     given["matching_samples"]["mirrored"][:] = mirrored
     params = settings(summed_height=30, summed_width=70)
-    crop = cut_wide_crop(params, given["matching_samples"], wide_scenes(given), np.random.default_rng(0))
+    crop = cut_wide_crop(
+        params, given["matching_samples"], channels(given), wide_scenes(given), np.random.default_rng(0)
+    )
     views = scene["channels"]["channels"]
     views = np.ascontiguousarray(views[::-1, :, :, ::-1]) if mirrored else views
     low, high = (int(end) for end in scene["truth"]["range"])
@@ -56,7 +62,9 @@ def test_a_crop_as_large_as_the_image_has_the_sums_of_its_map(mirrored: bool) ->
 def test_the_loss_of_costs_that_say_nothing_is_that_of_a_guess() -> None:
     """Of a guess among the valid disparities; one at the very edge of a window counts half."""
     given = inputs(shifted_scene())
-    crop = cut_wide_crop(settings(), given["matching_samples"], wide_scenes(given), np.random.default_rng(0))
+    crop = cut_wide_crop(
+        settings(), given["matching_samples"], channels(given), wide_scenes(given), np.random.default_rng(0)
+    )
     net = random_descriptor_net()
     with torch.no_grad():
         net.log_scale.fill_(-20)  # every cost is the same
@@ -77,7 +85,9 @@ def test_the_loss_of_costs_that_say_nothing_is_that_of_a_guess() -> None:
 
 def test_a_crop_without_a_known_truth_teaches_nothing() -> None:
     given = inputs(shifted_scene())
-    crop = cut_wide_crop(settings(), given["matching_samples"], wide_scenes(given), np.random.default_rng(0))
+    crop = cut_wide_crop(
+        settings(), given["matching_samples"], channels(given), wide_scenes(given), np.random.default_rng(0)
+    )
     nothing = replace(crop, truth=torch.full_like(crop.truth, torch.nan))
     net = random_descriptor_net().requires_grad_(True)
     value = summed_loss(net, nothing)
@@ -107,7 +117,9 @@ def test_a_training_that_was_killed_ends_as_an_undisturbed_one(killed_after: int
 def test_in_both_precisions_every_parameter_but_the_bias_learns() -> None:
     """Sums are compared with one another, so what is added to every cost changes nothing."""
     given = inputs(shifted_scene())
-    crop = cut_wide_crop(settings(), given["matching_samples"], wide_scenes(given), np.random.default_rng(0))
+    crop = cut_wide_crop(
+        settings(), given["matching_samples"], channels(given), wide_scenes(given), np.random.default_rng(0)
+    )
     for precision in ("float32", "bfloat16"):
         net = random_descriptor_net().requires_grad_(True)
         value = summed_loss(net, crop, precision)
