@@ -77,21 +77,20 @@ def canonical(value: object) -> str:
     return _spelled(plain(value))
 
 
-def _spelled(value: Json) -> str:
-    """As ``canonical``, of what is plain already."""
-    return _SPELL(value)
-
-
-_SPELL: Callable[[Json], str] = json.JSONEncoder(sort_keys=True, allow_nan=False, separators=(",", ":")).encode
+_spelled: Callable[[Json], str] = json.JSONEncoder(
+    sort_keys=True, allow_nan=False, check_circular=False, separators=(",", ":")
+).encode
+"""As ``canonical``, of what is plain already."""
 
 
 def digest(value: object) -> str:
     """Return the sha256 of the canonical JSON of ``value``, in hexadecimal."""
-    return _hash(canonical(value))
+    return digest_of_plain(plain(value))
 
 
-def _hash(text: str) -> str:
-    return hashlib.sha256(text.encode("ascii")).hexdigest()
+def digest_of_plain(value: Json) -> str:
+    """Return what ``digest`` does, of a value that ``plain`` returned before: a plan asks for thousands."""
+    return hashlib.sha256(_spelled(value).encode("ascii")).hexdigest()
 
 
 def parse(text: str) -> dict[str, Any]:
@@ -101,10 +100,16 @@ def parse(text: str) -> dict[str, Any]:
         ValueError: for anything else, for NaN and infinities, and for a repeated key.
     """
     try:
-        value = json.loads(text, object_pairs_hook=_unique, parse_constant=_refuse_constant)
+        value = _read(text)
         plain(value)  # nested too deeply for that is too deep for all that follows
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+    return value
+
+
+def _read(text: str) -> dict[str, Any]:
+    """As ``parse``, but for what is nested deeper than Python calls functions."""
+    value = _DECODER.decode(text)
     if isinstance(value, dict):
         return value
     raise ValueError("it is not a JSON object")
@@ -123,13 +128,18 @@ def _refuse_constant(name: str) -> NoReturn:
     raise ValueError(f"{name} is not JSON")
 
 
+_DECODER = json.JSONDecoder(
+    object_pairs_hook=_unique, parse_constant=_refuse_constant, parse_float=lambda text: _finite(float(text))
+)
+
+
 def seal(kind: str, content: Mapping[str, Any]) -> bytes:
     """Return the file of a document: its content, kind, format and checksum, readable."""
     return _sealed({**plain_mapping(kind, content), "kind": kind, "format": FORMAT_VERSION})
 
 
 def _sealed(body: dict[str, Any]) -> bytes:
-    return (laid_out({**body, "checksum": _hash(_spelled(body))}) + "\n").encode("ascii")
+    return (laid_out({**body, "checksum": digest_of_plain(body)}) + "\n").encode("ascii")
 
 
 def laid_out(value: Json, line: str = "\n") -> str:
@@ -171,7 +181,14 @@ def unseal(kind: str, data: bytes) -> dict[str, Any]:
         ValueError: saying what is wrong, if one byte differs from what was written, or if it is
             of another kind or format.
     """
-    sealed = parse(data.decode("ascii"))
+    try:
+        return _unsealed(kind, data)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
+def _unsealed(kind: str, data: bytes) -> dict[str, Any]:
+    sealed = _read(data.decode("ascii"))
     if sealed.get("format") != FORMAT_VERSION:
         raise ValueError(f"has format {sealed.get('format')!r}, this program reads {FORMAT_VERSION}")
     if sealed.get("kind") != kind:

@@ -6,6 +6,7 @@ import os
 import secrets
 import shutil
 import stat
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -19,8 +20,8 @@ T = TypeVar("T")
 R = TypeVar("R")
 THREADS = 4
 """Threads that read, hash and sync: enough to hide the disk's latency."""
-_SMALL = 1 << 18
-"""Bytes of a file that are hashed in one piece: making a buffer for more takes longer than hashing a small file."""
+_BLOCK = 1 << 18
+"""Bytes of a file that are read and hashed at a time."""
 
 _ADVICE = {
     errno.ENOSPC: "free some space, or choose another cache folder",
@@ -71,8 +72,23 @@ def in_threads(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
     items = list(items)
     if len(items) < 2:  # starting a thread would take longer
         return [function(item) for item in items]
+    found: dict[int, R] = {}
+    waiting: deque[tuple[int, T] | None] = deque([*enumerate(items), None])
+
+    def work() -> None:  # a task a thread: one an item would take longer than looking at a small entry
+        try:
+            while each := waiting.popleft():
+                found[each[0]] = function(each[1])
+        finally:
+            waiting.appendleft(None)  # the next thread ends too: nothing is left, or something went wrong
+
     with ThreadPoolExecutor(THREADS) as pool:
-        return list(pool.map(function, items))
+        try:
+            for thread in [pool.submit(work) for _ in range(min(THREADS, len(items)))]:
+                thread.result()
+        finally:
+            waiting.appendleft(None)
+    return [found[number] for number in range(len(items))]
 
 
 def is_folder(path: Path) -> bool:
@@ -134,10 +150,11 @@ def write_whole(path: Path, data: bytes) -> None:
 
 def hash_file(path: str | Path) -> str:
     """Return the sha256 of a file's bytes, in hexadecimal."""
-    with open(path, "rb") as file:  # noqa: PTH123 - a Path for each of thousands of small files costs more than hashing
-        sha256 = hashlib.sha256(head := file.read(_SMALL))
-        if len(head) == _SMALL:
-            hashlib.file_digest(file, lambda: sha256)
+    sha256 = hashlib.sha256()
+    # A Path, or a buffer, for each of thousands of small files would cost more than hashing them.
+    with open(path, "rb", buffering=0) as file:  # noqa: PTH123
+        while block := file.read(_BLOCK):
+            sha256.update(block)
     return sha256.hexdigest()
 
 
@@ -190,13 +207,15 @@ class StateFile:
                 file.unlink(missing_ok=True)
 
 
-def walk(folder: Path, prefix: str = "") -> Iterator[tuple[str, os.DirEntry[str]]]:
+def walk(folder: Path) -> Iterator[tuple[str, os.DirEntry[str]]]:
     """Yield all that is below ``folder``, each with its path relative to it; links are not followed."""
-    with os.scandir(f"{folder}/{prefix}") as things:  # many small files: building paths would take most of the time
-        for thing in things:
-            yield f"{prefix}{thing.name}", thing
-            if thing.is_dir(follow_symlinks=False):
-                yield from walk(folder, f"{prefix}{thing.name}/")
+    root, waiting = f"{folder}/", [""]
+    for prefix in waiting:
+        with os.scandir(root + prefix) as things:  # many small files: building paths would take most of the time
+            for thing in things:
+                yield (path := prefix + thing.name), thing
+                if thing.is_dir(follow_symlinks=False):
+                    waiting.append(path + "/")
 
 
 def walk_folders(folder: Path) -> Iterator[Path]:

@@ -54,12 +54,13 @@ _entry = lru_cache(2048)(Entry.from_bytes)
 _manifest = lru_cache(2048)(Manifest.from_bytes)
 
 
-def read_plain(path: Path) -> bytes:
+def read_plain(path: str | Path) -> bytes:
     """Return a file's bytes; a link in its place is damage, wherever it leads."""
-    if not stat.S_ISREG(path.lstat().st_mode):
+    if not stat.S_ISREG(os.lstat(path).st_mode):
         raise DamagedEntry(f"{path} is not a plain file")
     try:
-        return path.read_bytes()
+        with open(path, "rb", buffering=0) as file:  # noqa: PTH123 - thousands are read: a buffer takes time
+            return file.read()
     except OSError as error:
         if error.errno == errno.EIO:
             raise DamagedEntry(f"{path} cannot be read from the disk") from error
@@ -110,17 +111,17 @@ def _read_manifest(folder: Path, entry: Entry) -> Manifest:
 
 def _compare_files(folder: Path, manifest: Manifest, policy: Policy, remember: bool) -> None:
     """Compare what is in the folder with the manifest: names, kinds, sizes, and the bytes if asked."""
-    there = dict(walk(folder))
-    expected = {MANIFEST, *manifest.folders, *(file.path for file in manifest.files)}
-    if differing := sorted(set(there) ^ expected):
+    looked, there, folders = time.time(), dict(walk(folder)), manifest.folders
+    expected = {MANIFEST, *folders, *(file.path for file in manifest.files)}
+    if differing := sorted(there.keys() ^ expected):
         raise DamagedEntry(f"{differing[0]} is {'missing' if differing[0] in expected else 'not in its manifest'}")
-    for path in manifest.folders:
+    for path in folders:
         if not there[path].is_dir(follow_symlinks=False):
             raise DamagedEntry(f"{path} is not a folder")
     for file in manifest.files:
         _compare_size(file, there[file.path])
     if policy == "full":
-        _compare_bytes(folder, manifest, remember)
+        _compare_bytes([(file, there[file.path]) for file in manifest.files], looked if remember else None)
 
 
 def _compare_size(file: File, thing: os.DirEntry[str]) -> None:
@@ -131,15 +132,21 @@ def _compare_size(file: File, thing: os.DirEntry[str]) -> None:
         raise DamagedEntry(f"{file.path} has {size} bytes, its manifest says {file.size}")
 
 
-def _compare_bytes(folder: Path, manifest: Manifest, remember: bool) -> None:
-    """Compare each file's hash with the manifest."""
+def _compare_bytes(files: "list[tuple[File, os.DirEntry[str]]]", looked: float | None) -> None:
+    """Compare each file's hash with the manifest.
 
-    def differs(file: File) -> bool:
-        return _hash(f"{folder}/{file.path}", remember) != file.sha256
+    Args:
+        files: of the manifest, and what is in their place.
+        looked: no later than the times of the files were read; None: no hash is known or kept.
+    """
 
-    unknown = [file for file in manifest.files if not (remember and _known(f"{folder}/{file.path}") == file.sha256)]
-    small = sum(file.size for file in unknown) < THREADS_PAY
-    for file, wrong in zip(unknown, map(differs, unknown) if small else in_threads(differs, unknown), strict=True):
+    def differs(each: "tuple[File, os.DirEntry[str]]") -> bool:
+        return _hash(each[1], looked) != each[0].sha256
+
+    unknown = [(file, thing) for file, thing in files if looked is None or _known(thing) != file.sha256]
+    small = sum(file.size for file, _ in unknown) < THREADS_PAY
+    wrongs = map(differs, unknown) if small else in_threads(differs, unknown)
+    for (file, _), wrong in zip(unknown, wrongs, strict=True):
         if wrong:
             raise DamagedEntry(f"the bytes of {file.path} are not those that were written")
 
@@ -151,27 +158,27 @@ def forget() -> None:
     _manifest.cache_clear()
 
 
-def _hash(path: str, remember: bool) -> str | None:
+def _hash(thing: "os.DirEntry[str]", looked: float | None) -> str | None:
     """Return a file's sha256, and keep it if a later change of the file is sure to show; None if the disk fails."""
-    before, now = _fingerprint(path), time.time()
     try:
-        sha256 = hash_file(path)
+        sha256 = hash_file(thing.path)
     except OSError as error:
         if error.errno == errno.EIO:
             return None
         raise
-    if remember and _fingerprint(path) == before and now - max(before[1], before[2]) / 1e9 > SETTLED:
-        _hashed[path] = (before, sha256)
+    before = _fingerprint(thing.stat(follow_symlinks=False))
+    settled = looked is not None and looked - max(before[1], before[2]) / 1e9 > SETTLED
+    if settled and _fingerprint(os.lstat(thing.path)) == before:
+        _hashed[thing.path] = (before, sha256)
     return sha256
 
 
-def _known(path: str) -> str | None:
+def _known(thing: "os.DirEntry[str]") -> str | None:
     """Return the hash that was worked out earlier for this very file, unchanged since."""
-    known = _hashed.get(path)
-    return known[1] if known and known[0] == _fingerprint(path) else None
+    known = _hashed.get(thing.path)
+    return known[1] if known and known[0] == _fingerprint(thing.stat(follow_symlinks=False)) else None
 
 
-def _fingerprint(path: str) -> _Print:
+def _fingerprint(status: os.stat_result) -> _Print:
     """Return what changes with a file: size, both times, inode and device."""
-    status = os.lstat(path)
     return status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino, status.st_dev

@@ -5,12 +5,11 @@ Both are read strictly: what does not have exactly the written form is damaged.
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Self
 
-from semidense.cache.document import digest, plain_mapping, seal, unseal
+from semidense.cache.document import Json, digest_of_plain, plain_mapping, seal, unseal
 from semidense.cache.errors import CacheError, DamagedEntry, InvalidRecipe
 from semidense.cache.keys.recipe import Recipe, require_texts
 
@@ -49,20 +48,22 @@ def require_sha256(name: str, value: object) -> None:
 
 @dataclass(frozen=True)
 class Manifest:
-    """Every file of an entry, sorted by path; all that is read of an entry is read through it."""
+    """Every file of an entry, sorted by path; all that is read of an entry is read through it.
+
+    Attributes:
+        files: the files.
+        digest: the output digest: sha256 over the sorted (path, size, sha256).
+    """
 
     files: tuple[File, ...]
+    digest: str = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Refuse files out of order and a path named twice."""
+        """Refuse files out of order and a path named twice; work out the digest."""
         paths = [file.path for file in self.files]
         if any(first >= second for first, second in pairwise(paths)):
             raise ValueError("its paths are not sorted, or one is repeated")
-
-    @cached_property
-    def digest(self) -> str:
-        """The output digest: sha256 over the sorted (path, size, sha256)."""
-        return digest(self._rows())
+        object.__setattr__(self, "digest", digest_of_plain(self._rows()))
 
     @property
     def folders(self) -> frozenset[str]:
@@ -79,7 +80,7 @@ class Manifest:
         """Bytes of all files together."""
         return sum(file.size for file in self.files)
 
-    def _rows(self) -> list[list[str | int]]:
+    def _rows(self) -> list[Json]:
         """Return the files as JSON rows."""
         return [[file.path, file.size, file.sha256] for file in self.files]
 
@@ -99,7 +100,7 @@ class Manifest:
             if not isinstance(rows, list) or any(not isinstance(row, list) or len(row) != 3 for row in rows):
                 raise ValueError("its files are not rows of path, size and hash")
             return cls(tuple(File(*row) for row in rows))
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise DamagedEntry(f"the manifest is damaged: {error}") from None
 
 
@@ -169,7 +170,7 @@ class Entry:
             if content["key"] != key:
                 raise ValueError(f"it is the record of {content['key']!r}")
             return cls(**{**content, "recipe": Recipe.from_dict(content["recipe"])})
-        except (ValueError, CacheError) as error:
+        except (ValueError, CacheError, RecursionError) as error:
             raise DamagedEntry(f"the record of {key} is damaged: {error}") from None
 
 

@@ -4,11 +4,10 @@
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from typing import Any, Self
 
-from semidense.cache.document import FORMAT_VERSION, canonical, digest, plain_mapping
+from semidense.cache.document import FORMAT_VERSION, canonical, digest_of_plain, plain_mapping
 from semidense.cache.errors import InvalidRecipe
 
 Inputs = Mapping[str, str | Sequence[str] | Mapping[str, str]]
@@ -28,6 +27,7 @@ class Recipe:
             many results, such as one a scene.
         environment: what else changes bits, such as precision and library versions.
         version: of the format of keys and files.
+        key: the sha256 of the recipe's canonical JSON, 64 hexadecimal digits.
 
     Everything is kept as plain JSON types; a tuple becomes a list.
 
@@ -45,9 +45,10 @@ class Recipe:
     inputs: Inputs
     environment: Mapping[str, str]
     version: int = FORMAT_VERSION
+    key: str = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Reduce the fields to plain JSON types, so that equality, key and file agree."""
+        """Reduce the fields to plain JSON types, so that equality, key and file agree; work out the key."""
         for name in ("code", "params", "inputs", "environment"):
             object.__setattr__(self, name, plain_mapping(f"recipe.{name}", getattr(self, name)))
         if type(self.stage) is not str or not self.stage or type(self.version) is not int:
@@ -56,11 +57,8 @@ class Recipe:
         require_texts("recipe.environment", self.environment)
         for name, value in self.inputs.items():
             _require_digests(f"recipe.inputs.{name}", value)
-
-    @cached_property
-    def key(self) -> str:
-        """The sha256 of the recipe's canonical JSON, 64 hexadecimal digits."""
-        return digest([self.version, self.stage, self.code, self.params, self.inputs, self.environment])
+        ingredients = [self.version, self.stage, self.code, self.params, self.inputs, self.environment]
+        object.__setattr__(self, "key", digest_of_plain(ingredients))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the recipe as plain JSON types."""

@@ -3,12 +3,24 @@ import hashlib
 import os
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
 from semidense.cache.errors import CacheUnavailable, DamagedEntry
-from semidense.cache.files import hash_file, in_threads, make_folder, remove, walk, write_synced, write_whole, writing
+from semidense.cache.files import (
+    THREADS,
+    hash_file,
+    in_threads,
+    make_folder,
+    remove,
+    walk,
+    write_synced,
+    write_whole,
+    writing,
+)
 
 
 @pytest.mark.parametrize(
@@ -62,6 +74,32 @@ def test_threads_keep_order_and_pass_errors_on() -> None:
     assert in_threads(lambda x: x * x, range(50)) == [x * x for x in range(50)]
     with pytest.raises(ZeroDivisionError):
         in_threads(lambda x: 1 // x, [1, 0])
+
+
+def test_no_thread_begins_another_item_after_an_error() -> None:
+    begun: list[int] = []
+
+    def fail(number: int) -> None:
+        begun.append(number)
+        time.sleep(0.01)
+        raise ValueError(number)
+
+    with pytest.raises(ValueError, match=r"[0-3]"):
+        in_threads(fail, range(1000))
+    assert len(begun) <= THREADS
+
+
+def test_threads_take_the_next_item_when_they_are_done() -> None:
+    slow = threading.Event()
+
+    def work(number: int) -> int:
+        if number == 0:
+            assert slow.wait(60)  # the other threads do all the rest meanwhile
+        elif number == 99:
+            slow.set()
+        return number
+
+    assert in_threads(work, range(100)) == [*range(100)]
 
 
 def test_importing_the_cache_is_light() -> None:
