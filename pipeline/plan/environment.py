@@ -66,9 +66,15 @@ def former_version(entry: Entry) -> str | None:
     Keys hold the names of modules: an entry whose code lies in a module of ours that is gone is of another version.
     """
     ours = [name for name in entry.recipe.code if name.partition(".")[0] in ("semidense", *FORMER)]
-    if all(name.startswith("semidense") and source_text(name) is not None for name in ours):
+    if all(map(_is_there, ours)):
         return None
     return str(entry.extras.get("versions", {}).get("semidense-stereo", "unknown"))
+
+
+@cache
+def _is_there(module: str) -> bool:
+    """Return whether a module is one of this version; looked up once a process, for thousands of entries name it."""
+    return module.startswith("semidense") and source_text(module) is not None
 
 
 def missing_packages(stage: Stage) -> tuple[str, ...]:

@@ -50,7 +50,7 @@ def test_a_plan_of_what_is_to_be_made_reads_each_document_once_more(swept: Store
 @pytest.mark.parametrize(
     ("command", "most"),
     [
-        pytest.param(["cache", "gc", "--keep", *TRAINED[:1], "--train"], 4, id="gc --keep"),
+        pytest.param(["cache", "gc", "--keep", *TRAINED[:1], "--train"], 2, id="gc --keep"),
         pytest.param(["explain", "metrics", *TRAINED, "--scene", "test-0"], 4, id="explain"),
     ],
 )

@@ -1,7 +1,7 @@
 """Clean a cache: show what can go and why, and delete it when asked to."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,16 +11,19 @@ from rich.table import Table
 from semidense.cache import Entry
 from semidense.cache.upkeep.gc import collect, survey
 from semidense.cache.upkeep.limits import Item, Limits, Survey
-from semidense.pipeline.api import Task, open_store, status
+from semidense.pipeline.api import Task, open_store
 from semidense.pipeline.cli.console import print_json
+from semidense.pipeline.plan.building import build
 from semidense.pipeline.plan.environment import former_version
 from semidense.pipeline.plan.errors import UsageError
-from semidense.pipeline.plan.plan import Planned
+from semidense.pipeline.plan.plan import close_ranges
+from semidense.pipeline.plan.steps import Graph, Step
 from semidense.pipeline.results.text import bytes_text, results
 
 _UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0, "w": 7 * 86400.0}
 _BYTES = {"B": 1, "kB": 10**3, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 _NUMBER = re.compile(r"(\d+(?:\.\d+)?)\s*([A-Za-z]+)", re.ASCII)
+Label = tuple[tuple[str, str], ...]
 SHOWN = 40
 """Lines of a list of things to delete; more are counted."""
 
@@ -49,16 +52,35 @@ class Wish:
         reached = frozenset(self._reached(folder, entries)) if self.keep else None
         return Limits(reached, seconds, None if largest is None else int(largest), _useless(entries))
 
-    def _reached(self, folder: str | None, entries: Iterable[Entry]) -> Iterator[str]:
+    def _reached(self, folder: str | None, entries: Sequence[Entry]) -> Iterator[str]:
         """Yield the keys that the datasets reach, each with each configuration."""
-        by_label: dict[tuple[tuple[str, str], ...], list[Entry]] = {}
+        store, by_label = open_store(folder), dict[Label, list[Entry]]()
         for entry in entries:
-            by_label.setdefault(tuple(sorted(entry.label.items())), []).append(entry)
+            by_label.setdefault(_label(entry.label), []).append(entry)
+        digests = {entry.key: entry.digest for entry in entries}
         for dataset in self.keep:
             for config in self.configs or (None,):
-                for planned in status(Task(dataset, config=config, train=self.train, cache=folder)).steps:
-                    same_label = by_label.get(tuple(sorted(planned.step.label.items())), ())
-                    yield from [planned.key] if planned.key else _possible(same_label, planned)
+                request = Task(dataset, config=config, train=self.train).request("metrics")
+                yield from _keys(build(close_ranges(request, store)), digests, by_label)
+
+
+def _label(label: Mapping[str, str]) -> Label:
+    return tuple(sorted(label.items()))
+
+
+def _keys(graph: Graph, digests: Mapping[str, str], by_label: Mapping[Label, Sequence[Entry]]) -> Iterator[str]:
+    """Yield the keys that steps have by what the records say; of a step that lacks an input, all that it may have.
+
+    No data are read: those of a damaged entry will be made again, with the digest that its record tells.
+    """
+    known: dict[str, str] = {}
+    for step in graph.steps.values():
+        if not all(each in known for ids in step.inputs.values() for each in ids):
+            yield from _possible(by_label.get(_label(step.label), ()), step)
+            continue
+        yield (key := step.recipe(known).key)
+        if key in digests:
+            known[step.id] = digests[key]
 
 
 def _useless(entries: Iterable[Entry]) -> dict[str, str]:
@@ -67,9 +89,8 @@ def _useless(entries: Iterable[Entry]) -> dict[str, str]:
     return {key: f"made by version {version}, whose code is gone" for key, version in versions.items() if version}
 
 
-def _possible(entries: Iterable[Entry], planned: Planned) -> Iterator[str]:
+def _possible(entries: Iterable[Entry], step: Step) -> Iterator[str]:
     """Yield the entries that a step may still find, as long as its inputs are missing."""
-    step = planned.step
     for entry in entries:
         same = (entry.recipe.code, entry.recipe.params, entry.recipe.environment)
         if same == (step.code, step.settings, step.environment):
