@@ -160,10 +160,11 @@ class _Builder:
         other = self.config.choice("use", product) or product
         if other not in STAGES:
             raise UsageError(f"use.{product} = {other!r}: no product {other!r}; {nearest(other, STAGES)}")
-        stage, own = STAGES[other], STAGES[product]
+        if (stage := STAGES[other]) is (own := STAGES[product]):
+            return stage, self.config.section(stage.section or other)
         arrays = {output.name: output.dims for output in stage.outputs}
         missing = [output.name for output in own.outputs if arrays.get(output.name) != output.dims]
-        if missing or stage.scope != own.scope or (other != product and product in made_from(other)):
+        if missing or stage.scope != own.scope or product in made_from(other):
             why = f"it has no array {missing[0]!r} with its dimensions" if missing else f"it is made from {product}"
             raise UsageError(f"use.{product} = {other!r}: {other} cannot take the place of {product}, {why}")
         return replace(stage, product=product), self.config.section(stage.section or other)
@@ -262,30 +263,30 @@ class _Builder:
 
 def resolved(params: Params, scene: SceneSource | None) -> Params:
     """Return the settings with what was left open filled in: the scene's range, this CPU's precision."""
-    update: dict[str, Any] = {}
+    settings, update = dict(params), dict[str, Any]()
+    if "precision" in settings:
+        update["precision"] = resolve(settings["precision"], transformed=getattr(params, "transformed", False))
     if scene:
-        _require_within(params, scene)
-    if scene and getattr(params, "right", False) is None:
-        update["right"] = not scene.one_view
-    if hasattr(params, "precision"):
-        update["precision"] = resolve(params.precision, transformed=getattr(params, "transformed", False))
-    if scene and getattr(params, "d_min", 0) is None:
-        update["d_min"] = max(scene.disparities.minimum, 1 - scene.size[1])
-    if scene and getattr(params, "d_max", 0) is None:
-        update["d_max"] = min(scene.disparities.maximum, scene.size[1] - 1)  # a file may claim any number
+        _require_within(settings, scene)
+        known = {
+            "right": not scene.one_view,
+            "d_min": max(scene.disparities.minimum, 1 - scene.size[1]),
+            "d_max": min(scene.disparities.maximum, scene.size[1] - 1),  # a file may claim any number
+        }
+        update |= {name: value for name, value in known.items() if settings.get(name, value) is None}
+    if not update:
+        return params
     try:
-        return type(params).model_validate(dict(params) | update)
+        return type(params).model_validate(settings | update)
     except ValidationError as error:
         raise UsageError(f"{scene.name if scene else 'training split'}: {one_line(error)}") from None
 
 
-def _require_within(params: Params, scene: SceneSource) -> None:
+def _require_within(settings: Mapping[str, Any], scene: SceneSource) -> None:
     """Refuse a range that no pixel of the image can have: it would only fill memory and disk."""
-    width = scene.size[1]
     for name in ("d_min", "d_max"):
-        value = getattr(params, name, None)
-        if value is not None and abs(value) >= width:
-            raise UsageError(f"{scene.name}: {name} is {value} px, but the image is only {width} px wide")
+        if abs(value := settings.get(name) or 0) >= scene.size[1]:
+            raise UsageError(f"{scene.name}: {name} is {value} px, but the image is only {scene.size[1]} px wide")
 
 
 def require_trainable(config: Config, product: str) -> None:
