@@ -170,9 +170,9 @@ class Store:
             EntryNotFound, DamagedEntry, InvalidKey, CacheUnavailable: as ``require`` does.
         """
         _, data = self._aside(key, lambda: self.backend.data(key, self.verify))
-        from semidense.cache.entries.reader import open_group
+        from semidense.cache.entries.reader import open_arrays
 
-        return dict(open_group(data).arrays())
+        return open_arrays(data)
 
     def read(self, key: str) -> "dict[str, NDArray[Any]]":
         """Return all arrays of the entry, in memory; checked as ``require`` does.
@@ -180,9 +180,9 @@ class Store:
         Raises:
             EntryNotFound, DamagedEntry, InvalidKey, CacheUnavailable: as ``require`` does.
         """
-        import numpy as np
+        from semidense.cache.entries.reader import values_of
 
-        return {name: np.asarray(array[...]) for name, array in self.arrays(key).items()}
+        return {name: values_of(array) for name, array in self.arrays(key).items()}
 
     def _checked(self, key: str) -> Entry:
         entry = self.backend.record(key)

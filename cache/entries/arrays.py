@@ -184,6 +184,15 @@ def encoded(chunk: "NDArray[Any]") -> bytes:
     return bytes(Zstd(level=ZSTD_LEVEL, checksum=True).encode(plain.reshape(-1).view(np.uint8)))
 
 
+def decoded(data: bytes, kind: "np.dtype[Any]") -> "NDArray[Any]":
+    """Return the values of a chunk's file in one row, to be changed by the caller; its own checksum is compared."""
+    import numpy as np
+    from numcodecs.zstd import Zstd
+
+    plain = np.frombuffer(bytearray(Zstd().decode(data)), kind.newbyteorder("<"))
+    return plain.astype(kind, copy=False)
+
+
 def require_region(
     where: str, array: "zarr.Array[Any]", region: tuple[slice, ...], data: "NDArray[Any]"
 ) -> tuple[slice, ...]:

@@ -1,12 +1,15 @@
 """Read an entry's arrays through its manifest alone. Imports zarr: loaded when data are opened."""
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import zarr
-from zarr.storage import LocalStore
+from zarr.storage import LocalStore, StorePath
 
 from semidense.cache.entries import forks  # noqa: F401 - importing it makes reads in forked children safe
+from semidense.cache.entries.arrays import chunk_paths, decoded
 from semidense.cache.entries.entry import DATA, Entry, File, Manifest
 from semidense.cache.errors import DamagedEntry
 
@@ -15,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Iterable, Mapping
 
     import xarray as xr
+    from numpy.typing import NDArray
     from zarr.abc.store import ByteRequest
     from zarr.core.buffer import Buffer, BufferPrototype
 
@@ -31,6 +35,10 @@ class Listing:
     """What a zarr store of one manifest says of its files without reading them."""
 
     _sizes: "Mapping[str, int]"
+
+    def arrays(self) -> "builtins.list[str]":
+        """Return the names of the entry's arrays."""
+        return [key.partition("/")[0] for key in self._sizes if key.endswith("/zarr.json")]
 
     async def getsize(self, key: str) -> int:
         """Return the size of a file of the manifest; FileNotFoundError if the manifest lists none."""
@@ -100,6 +108,10 @@ class EntryStore(Listing, LocalStore):
             return None
         return self._require(key, super().get_sync(key, prototype=prototype, byte_range=byte_range), byte_range)
 
+    def read(self, key: str) -> bytes:
+        """Return the bytes of a file of the manifest."""
+        return self._require(key, super().get_sync(key), None).to_bytes()
+
     async def get_partial_values(
         self,
         prototype: "BufferPrototype",
@@ -115,9 +127,22 @@ class EntryStore(Listing, LocalStore):
         return data
 
 
-def open_group(store: Any) -> zarr.Group:  # noqa: ANN401 - zarr's type of stores is not ours to name
-    """Return the arrays of an entry's store as a zarr group that can only be read."""
-    return zarr.open_group(store, mode="r", zarr_format=3, use_consolidated=False)
+def open_arrays(store: Any) -> "dict[str, zarr.Array[Any]]":  # noqa: ANN401 - what all backends' stores have in common
+    """Return the arrays of an entry's store by name, as zarr opens them, but without a wait for its event loop."""
+    about = {name: store.read(f"{name}/zarr.json") for name in store.arrays()}
+    return {name: zarr.Array.from_dict(StorePath(store, name), json.loads(data)) for name, data in about.items()}
+
+
+def values_of(array: "zarr.Array[Any]") -> "NDArray[Any]":
+    """Return all values of an array that ``open_arrays`` opened, the caller's own.
+
+    One of a single chunk is decoded here: a wait for zarr's event loop takes longer than reading a small map.
+    """
+    if array.nchunks != 1:
+        return np.asarray(array[...])
+    (path,) = chunk_paths(array.shape, array.chunks)
+    data = array.store.read(f"{array.path}/{path}")  # type: ignore[attr-defined]
+    return decoded(data, array.dtype).reshape(array.chunks)[(*(slice(0, length) for length in array.shape), ...)]
 
 
 def open_dataset(store: Any, entry: Entry) -> "xr.Dataset":  # noqa: ANN401

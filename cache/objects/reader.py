@@ -71,6 +71,10 @@ class ObjectStore(Listing, Store):
         self._check_readable(read_only)
         return self
 
+    def read(self, key: str) -> bytes:
+        """Return the bytes of a file of the manifest."""
+        return self._fetch(self._files[key])
+
     async def get(
         self, key: str, prototype: "BufferPrototype | None" = None, byte_range: ByteRequest | None = None
     ) -> "Buffer | None":

@@ -63,10 +63,13 @@ class Recent:
 
     def _open(self, store: Store, key: str) -> dict[str, Labelled]:
         """Return the arrays of an entry that is not kept; keep a small one."""
-        found = labelled(store.arrays(key))
+        arrays = store.arrays(key)
+        found = labelled(arrays)
         if _bytes(found) > LARGE:
             return found
-        found = {name: Labelled(own(array.values), array.dims) for name, array in found.items()}
+        from semidense.cache.entries.reader import values_of
+
+        found = {name: Labelled(values_of(array), found[name].dims) for name, array in arrays.items()}
         self._keep(key, found)
         return found
 
