@@ -142,7 +142,8 @@ def values_of(array: "zarr.Array[Any]") -> "NDArray[Any]":
         return np.asarray(array[...])
     (path,) = chunk_paths(array.shape, array.chunks)
     data = array.store.read(f"{array.path}/{path}")  # type: ignore[attr-defined]
-    return decoded(data, array.dtype).reshape(array.chunks)[(*(slice(0, length) for length in array.shape), ...)]
+    chunk = decoded(data, array.dtype).reshape(array.chunks)
+    return chunk if chunk.shape == array.shape else chunk[tuple(slice(length) for length in array.shape)]
 
 
 def open_dataset(store: Any, entry: Entry) -> "xr.Dataset":  # noqa: ANN401

@@ -15,6 +15,7 @@ from semidense.pipeline.execution.watch import Unwatched
 from semidense.pipeline.results.result import Result
 from tests.faults import world
 from tests.faults.runs import slow
+from tests.faults.runs.workers import cluster
 from tests.s3 import Faults, pointed_at, proxy, s3_server
 from tests.tiny import TEST_ONLY
 
@@ -53,12 +54,27 @@ def test_s3_holds_the_same_keys_and_digests_as_a_folder(
         assert all(made.reused for made in again.made.values())
 
 
+@pytest.fixture(scope="module")
+def four_workers(port: int) -> Iterator[str]:
+    """The address of a cluster of four processes that find the S3 server."""
+    with pointed_at(port), cluster(4) as address:
+        yield address
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-def test_the_preset_robust_gives_the_same_digests_in_an_object_store(tmp_path: Path) -> None:
-    on_disk = api.run(Task(TEST_ONLY, preset="robust", cache=tmp_path / "cache"), "confidence")
-    in_memory = api.run(Task(TEST_ONLY, preset="robust", cache="memory://robust"), "confidence")
-    require_same(in_memory, on_disk)
+@pytest.mark.parametrize("preset", ["paper", "robust"])
+def test_four_workers_give_the_digests_of_threads_in_a_folder_and_on_s3(
+    port: int, four_workers: str, tmp_path: Path, preset: str
+) -> None:
+    task = Task(TEST_ONLY, preset=preset)
+    expected = api.run(task, cache=tmp_path / "threads")
+    require_same(api.run(task, cache=tmp_path / "workers", scheduler=four_workers), expected)
+    require_same(api.run(task, cache="memory://" + preset), expected)
+    with pointed_at(port) as url:
+        require_same(api.run(task, cache=url, scheduler=four_workers), expected)
+    with pointed_at(port) as url:
+        require_same(api.run(task, cache=url), expected)
 
 
 @pytest.mark.slow
