@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 from semidense.cache import Change, Store
 from semidense.cache.keys.recipe import short
@@ -87,19 +87,13 @@ def _print_parts(parts: Sequence[Part], workers: int, console: Console) -> None:
         seconds = part.seconds_on(workers)
         size = "unknown" if part.bytes is None else f"{part.bytes / 1e6:,.1f}"
         table.add_row(part.product, f"{part.tasks:,}", size, "unknown" if seconds is None else f"{seconds / 60:,.2f}")
-    console.print(table)
+    print_table(table, console, ("tasks",))
 
 
 def print_plan(plan: Plan, time: Estimate, parts: Sequence[Part] = (), workers: int = 1) -> None:
     """Print a line a product and scene: its state, its key, and why it is not a hit; then how long a run takes."""
-    table = Table("product", "scene", "state", "key", "why", box=None, pad_edge=False)
-    tellers: dict[str, str] = {}
-    for planned in plan.steps:
-        state = f"[{STYLES[planned.state]}]{planned.state}[/]"
-        scene, reason = escape(planned.step.scene), escape(why(planned, tellers))
-        table.add_row(planned.step.product, scene, state, short(planned.key or ""), reason)
     console = results()
-    console.print(table)
+    print_table(_plan_table(plan), console, ("key",))
     print_notes(plan.notes)
     if parts:
         _print_parts(parts, workers, console)
@@ -112,6 +106,18 @@ def print_plan(plan: Plan, time: Estimate, parts: Sequence[Part] = (), workers: 
     if todo:
         where = f" on {workers} worker{'s' if workers > 1 else ''}" if parts and time.seconds is not None else ""
         console.print(f"time: {time}{where}", highlight=False)
+
+
+def _plan_table(plan: Plan) -> Table:
+    """Return a line a step; a column "why" only if a step is not a hit."""
+    tellers: dict[str, str] = {}
+    reasons = [escape(why(planned, tellers)) for planned in plan.steps]
+    table = Table("product", "scene", "state", "key", *(["why"] if any(reasons) else []), box=None, pad_edge=False)
+    for planned, reason in zip(plan.steps, reasons, strict=True):
+        state = f"[{STYLES[planned.state]}]{planned.state}[/]"
+        cells = (planned.step.product, escape(planned.step.scene), state, short(planned.key or ""))
+        table.add_row(*cells, *([reason] if any(reasons) else []))
+    return table
 
 
 LONG = 10.0
@@ -186,13 +192,13 @@ def print_metrics(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -
 
 def _print_rows(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -> None:
     swept = len({_swept(row) for row in rows}) > 1
-    table = Table("scene", "threshold px", "R", *(FIGURES[name].head for name in _COLUMNS), box=None)
-    for column in table.columns[1:]:
-        column.justify = "right"
+    by_threshold = any("R" in row for row in rows)
+    heads = ("threshold px", *(["R"] if by_threshold else []), *(FIGURES[name].head for name in _COLUMNS))
+    table = Table("scene", *(Column(head, justify="right") for head in heads), box=None)
     if swept:
         table.add_column("settings")
     for row in rows:
-        table.add_row(*_cells(row), *([escape(_swept(row))] if swept else []))
+        table.add_row(*_cells(row, by_threshold), *([escape(_swept(row))] if swept else []))
     console = results()
     print_table(table, console, _SPARE)
     kinds = ", ".join(sorted(set(masks.values())))
@@ -210,10 +216,11 @@ def _swept(row: Mapping[str, Any]) -> str:
     return ", ".join(each for each in settings if not each.startswith("semidense.R="))
 
 
-def _cells(row: Mapping[str, Any]) -> list[str]:
+def _cells(row: Mapping[str, Any], by_threshold: bool) -> list[str]:
+    """Return a row's cells; with one for R if a row of the table was filtered by a threshold."""
     figures = [FIGURES[name].text(row.get(name)) for name in _COLUMNS]
-    threshold = f"{row['R']:g}" if "R" in row else "-"
-    return [escape(row["scene"]), f"{row['threshold_px']:g}", threshold, *figures]
+    threshold = [f"{row['R']:g}" if "R" in row else "-"] if by_threshold else []
+    return [escape(row["scene"]), f"{row['threshold_px']:g}", *threshold, *figures]
 
 
 def print_sweep(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -> None:

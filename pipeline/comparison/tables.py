@@ -1,7 +1,6 @@
 """Print a comparison: one table an experiment, then the paper's figures."""
 
 from collections.abc import Iterable, Sequence
-from textwrap import fill
 
 from rich.console import Console
 from rich.markup import escape
@@ -11,7 +10,7 @@ from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.paper_figures import QUOTED
 from semidense.pipeline.comparison.rows import Row
 from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, mean_name
-from semidense.pipeline.results.text import print_in_parts, results
+from semidense.pipeline.results.text import print_table, results
 
 TITLES = {
     "raw": "Raw maps: wrong or unreported pixels, %",
@@ -49,9 +48,11 @@ def print_comparison(found: Comparison, masks: Iterable[str], threshold: float =
     for experiment, figure in (("raw", "raw_bad"), ("auc", "auc")):
         if of(rows, experiment):
             table = _by_scene(of(rows, experiment), of(means, experiment), experiment, figure)
-            print_in_parts(_fitted(table, console), console)
+            print_table(table, console)
+            console.print()
     if of(rows, "density"):
-        print_in_parts(_fitted(_density_table(of(means, "density")), console), console)
+        print_table(_density_table(of(means, "density")), console)
+        console.print()
     _print_quoted(console, quoted(found))
     kinds = ", ".join(sorted(set(masks)))
     console.print()
@@ -96,15 +97,6 @@ def _density_table(means: Sequence[Row]) -> Table:
     return table
 
 
-def _fitted(table: Table, console: Console) -> Table:
-    """Return the table; if it is too wide for the console, its headings are broken into lines between words."""
-    if console.measure(table, options=console.options.update(width=1000)).maximum > console.width:
-        for column in table.columns:
-            words = str(column.header).split()
-            column.header = fill(" ".join(words), max(map(len, words)), break_on_hyphens=False)
-    return table
-
-
 def _print_quoted(console: Console, quoted: Sequence[Row]) -> None:
     """Print the paper's figures, those of the same data together."""
     console.print("Quoted from the paper: other data, another resolution", style="italic")
@@ -121,7 +113,7 @@ def _print_quoted(console: Console, quoted: Sequence[Row]) -> None:
 def _table(title: str, *columns: str) -> Table:
     table = Table(*(escape(column) for column in columns), title=title, title_justify="left", box=None, pad_edge=False)
     for column in table.columns[1:]:
-        column.justify, column.no_wrap = "right", True
+        column.justify = "right"
     return table
 
 

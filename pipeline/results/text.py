@@ -2,14 +2,17 @@
 
 import json
 from collections.abc import Sequence
+from textwrap import fill
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from semidense.cache.keys.recipe import short
 
 _SHOWN = 3
 """Values of a list that are written out, at most."""
+_TEXT = 20
+"""Characters that a line of a folded text has at least."""
 
 
 def bytes_text(count: int) -> str:
@@ -51,48 +54,84 @@ def results() -> Console:
     return Console(highlight=False) if Console().is_terminal else Console(highlight=False, width=240)
 
 
-def print_table(table: Table, console: Console, spare: Sequence[str]) -> None:
-    """Print a table; where it is too wide, leave columns out and name them below. No number is cut.
+def print_table(table: Table, console: Console, spare: Sequence[str] = ()) -> None:
+    """Print a table; where it is too wide, break its heads, leave columns out, then print it in parts.
+
+    No number is cut: columns that are aligned right, or that must not wrap, keep their width. Other texts are folded.
 
     Args:
         table: with texts as cells.
         console: to print on.
-        spare: heads of the columns that may be left out, the least important first.
+        spare: heads of the columns that may be left out, the least important first. They are named below the table.
     """
     out: list[str] = []
-    there = [str(column.header) for column in table.columns]
-    for head in (each for each in spare if each in there):
-        if _width(table, console) <= console.width:
+    if not _fits(table, console):
+        table = _with_broken_heads(table, console)
+    for head in (each for each in spare if each in _heads(table)):
+        if _fits(table, console):
             break
         out.append(head)
-        table = _only(table, [str(column.header) for column in table.columns if column.header != head])
-    console.print(table)
+        table = _only(table, [each for each in _heads(table) if each != head])
+    _print_in_parts(table, console)
     if out:
         console.print(f"left out at this width: {', '.join(out)}; --json has all", style="dim", markup=False)
 
 
-def print_in_parts(table: Table, console: Console) -> None:
-    """Print a table; where it is too wide, print it as several, each with the first column. No number is cut."""
-    heads = [str(column.header) for column in table.columns]
-    while len(heads) > 1:
+def _print_in_parts(table: Table, console: Console) -> None:
+    """Print a table that fits; one that does not as several with a blank line between, each with the first column."""
+    heads = _heads(table)
+    while heads:
         part = heads[:2]
-        while len(part) < len(heads) and _width(_only(table, heads[: len(part) + 1]), console) <= console.width:
+        while len(part) < len(heads) and _fits(_only(table, heads[: len(part) + 1]), console):
             part = heads[: len(part) + 1]
-        console.print(_only(table, part), "")
-        heads = [heads[0], *heads[len(part) :]]
+        console.print(_only(table, part))
+        rest = heads[len(part) :]
+        heads = [heads[0], *rest] if rest else []
+        if rest:
+            console.print()
 
 
-def _width(table: Table, console: Console) -> int:
-    """Return the characters that a table needs to show every cell in one line."""
-    return console.measure(table, options=console.options.update(width=1000)).maximum
+def _fits(table: Table, console: Console) -> bool:
+    """Return whether a table fits when its texts are folded to ``_TEXT`` characters."""
+    full = console.measure(table, options=console.options.update(width=1000)).maximum
+    return full - sum(_foldable(column, console) for column in table.columns) <= console.width
+
+
+def _foldable(column: Column, console: Console) -> int:
+    """Return how many characters a column can be narrower than its longest cell."""
+    return 0 if _is_whole(column) else max(0, *(width - _TEXT for width in _widths(column, console)))
+
+
+def _widths(column: Column, console: Console) -> list[int]:
+    """Return how many characters the head and each cell of a column need in one line."""
+    options = console.options.update(width=1000)
+    return [console.measure(cell, options=options).maximum for cell in (column.header, *column.cells)]
+
+
+def _is_whole(column: Column) -> bool:
+    return column.no_wrap or column.justify == "right"
+
+
+def _heads(table: Table) -> list[str]:
+    """Return the heads of a table, each in one line."""
+    return [" ".join(str(column.header).split()) for column in table.columns]
+
+
+def _with_broken_heads(table: Table, console: Console) -> Table:
+    """Return a table whose heads are broken between words where they are wider than the cells below."""
+    broken = _only(table, _heads(table))
+    for column, head in zip(broken.columns, _heads(table), strict=True):
+        width = max(1, *map(len, head.split()), *_widths(column, console)[1:])
+        column.header = fill(head, width, break_on_hyphens=False)
+    return broken
 
 
 def _only(table: Table, heads: Sequence[str]) -> Table:
-    """Return a table of some of the columns."""
-    kept = [column for column in table.columns if str(column.header) in heads]
+    """Return a table of some of the columns, named by their heads in one line."""
+    kept = [column for column, head in zip(table.columns, _heads(table), strict=True) if head in heads]
     narrower = Table(box=None, pad_edge=table.pad_edge, title=table.title, title_justify=table.title_justify)
     for column in kept:
-        narrower.add_column(column.header, justify=column.justify, no_wrap=column.no_wrap)
+        narrower.add_column(column.header, justify=column.justify, no_wrap=_is_whole(column), overflow="fold")
     for cells in zip(*(column.cells for column in kept), strict=True):
         narrower.add_row(*cells)
     return narrower

@@ -126,20 +126,34 @@ def _array_statistics(name: str, array: "xr.DataArray") -> dict[str, Any]:
     return row | {key: value for key, value in figures.items() if np.isfinite(value)}
 
 
+def _number(value: float) -> str:
+    """Return a value to four digits; a large one as a whole number.
+
+    >>> _number(310290.0), _number(0.05618)
+    ('310,290', '0.05618')
+    """
+    return f"{value:,.0f}" if 1e4 <= abs(value) < 1e12 else f"{value:.4g}"
+
+
 def print_inspection(found: Inspection, png: Path | None, as_json: bool) -> None:
     """Print the xarray, a line of statistics an array, the picture's path, and how to open the product in Python."""
+    import xarray as xr
+
     rows, step = statistics(found.dataset), found.planned.step
     if as_json:
         head = {"product": step.product, "scene": step.scene, "key": found.planned.key}
         print_json({**head, "arrays": rows, "png": str(png) if png else None})
         return
     console = Console(highlight=False, soft_wrap=True)
-    console.print(repr(found.dataset.drop_attrs(deep=False)), markup=False)
+    with xr.set_options(display_width=console.width):  # type: ignore[no-untyped-call]
+        console.print(repr(found.dataset.drop_attrs(deep=False)), markup=False)
     table = Table("array", "dims", "dtype", "min", "max", "mean", "none", "unit", box=None)
     for row in rows:
-        figures = [f"{row[name]:.4g}" if name in row else "-" for name in ("min", "max", "mean")]
+        figures = [_number(row[name]) if name in row else "-" for name in ("min", "max", "mean")]
         none = f"{100 * row['none']:.1f} %" if "none" in row else "-"
         table.add_row(row["name"], row["dims"], row["dtype"], *figures, none, row["units"])
+    for column in table.columns:
+        column.no_wrap = True
     for column in table.columns[3:7]:
         column.justify = "right"
     print_table(table, console, ("dims", "unit", "dtype"))

@@ -141,8 +141,12 @@ def test_other_masks_are_left_to_json(capsys: pytest.CaptureFixture[str]) -> Non
     assert table([ROW | {"mask": "all"}], capsys) == []
 
 
-def test_a_row_without_a_threshold_has_none(capsys: pytest.CaptureFixture[str]) -> None:
-    assert table([{name: value for name, value in ROW.items() if name != "R"}], capsys)[1][:3] == ["A", "1", "-"]
+def test_a_threshold_has_a_column_where_a_row_has_one(capsys: pytest.CaptureFixture[str]) -> None:
+    by_density = {name: value for name, value in ROW.items() if name != "R"}
+    heads, cells = table([by_density], capsys)[:2]
+    assert "R" not in heads
+    assert cells[:3] == ["A", "1", "20.00"]
+    assert [cells[2] for cells in table([ROW, by_density | {"scene": "B"}], capsys)[1:3]] == ["0.9", "-"]
 
 
 def test_a_sweep_shows_means_and_a_dash_for_what_a_scene_lacks(capsys: pytest.CaptureFixture[str]) -> None:

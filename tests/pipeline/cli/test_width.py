@@ -1,24 +1,25 @@
-"""What a terminal of 80 columns shows."""
+"""What terminals of 80 and 60 columns show."""
 
 import io
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
 
 from semidense.cache import Store
-from semidense.pipeline.api import Task, explain
+from semidense.pipeline.api import Task, explain, open_store, status
 from semidense.pipeline.cli import console as printing
 from semidense.pipeline.cli.commands import inspect
-from semidense.pipeline.cli.commands.cache import listing
+from semidense.pipeline.cli.commands.cache import cleaning, listing
 from semidense.pipeline.results.result import Result
 
 
-@pytest.fixture
-def terminal(monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
-    """A terminal of 80 columns that all tables are printed on."""
+@pytest.fixture(params=[80, 60])
+def terminal(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
+    """A narrow terminal that all tables are printed on."""
     text = io.StringIO()
-    narrow = Console(file=text, width=80, highlight=False)
-    for module in (printing, listing):
+    narrow = Console(file=text, width=request.param, highlight=False)
+    for module in (printing, listing, cleaning):
         monkeypatch.setattr(module, "results", lambda: narrow)
     monkeypatch.setattr(inspect, "Console", lambda **_: narrow)
     return text
@@ -50,3 +51,18 @@ def test_inspect(trained: Result, trained_task: Task, terminal: io.StringIO) -> 
 def test_a_plan(trained: Result, terminal: io.StringIO) -> None:
     printing.print_plan(trained.plan, printing.estimate(trained.plan, trained.store))
     assert "…" not in terminal.getvalue()
+
+
+def test_reasons_of_a_plan_are_folded_not_cut(trained_task: Task, terminal: io.StringIO) -> None:
+    task = replace(trained_task, settings=[*trained_task.settings, "channels.rank_window=9"])
+    printing.print_plan(status(task), printing.estimate(status(task), open_store(task.cache)))
+    shown = terminal.getvalue()
+    assert "…" not in shown
+    assert "->" in shown
+    assert all(line.split()[2] in ("hit", "stale", "missing") for line in shown.splitlines() if "test-0" in line)
+
+
+def test_what_can_be_deleted(trained_task: Task, terminal: io.StringIO) -> None:
+    cleaning.clean(trained_task.cache, cleaning.Wish(max_size="1B"), yes=False, as_json=False)
+    assert "…" not in terminal.getvalue()
+    assert "the cache is too large" in " ".join(terminal.getvalue().split())

@@ -9,8 +9,9 @@ from rich.console import Console
 
 from semidense.pipeline.comparison.ablation import ABLATION
 from semidense.pipeline.comparison.methods import LOWERED, MATCHERS
-from semidense.pipeline.comparison.tables import _by_scene, _fitted
+from semidense.pipeline.comparison.tables import _by_scene
 from semidense.pipeline.results.metric_rows import METHOD
+from semidense.pipeline.results.text import print_table
 
 SCENES = ("Motorcycle", "MotorcycleE", "Piano", "PianoL", "Pipes", "Playroom", "Shelves", "Teddy")
 METHODS = (f"{METHOD}, shipped weights", *MATCHERS, LOWERED, *ABLATION)
@@ -21,7 +22,7 @@ def printed(width: int, methods: Sequence[str] = METHODS) -> list[str]:
     rows = [{"scene": scene, "method": method, "raw_bad": 20.123} for scene in SCENES for method in methods]
     means = [{"scene": "mean of 8", "method": method, "raw_bad": 20.1} for method in methods]
     console = Console(file=io.StringIO(), width=width)
-    console.print(_fitted(_by_scene(rows, means, "raw", "raw_bad"), console))
+    print_table(_by_scene(rows, means, "raw", "raw_bad"), console)
     return console.file.getvalue().splitlines()  # type: ignore[attr-defined, no-any-return]
 
 

@@ -18,7 +18,7 @@ from semidense.pipeline.plan.environment import former_version
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import close_ranges
 from semidense.pipeline.plan.steps import Graph, Step
-from semidense.pipeline.results.text import bytes_text, results
+from semidense.pipeline.results.text import bytes_text, print_table, results
 
 _UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0, "w": 7 * 86400.0}
 _BYTES = {"B": 1, "kB": 10**3, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
@@ -136,7 +136,7 @@ def _print_items(items: tuple[Item, ...]) -> None:
         names = [escape(label.get(name, "")) for name in ("product", "scene")]
         table.add_row(item.kind, *names, bytes_text(item.size), escape(item.name[:12]), escape(item.reason))
     if items:
-        results().print(table)
+        print_table(table, results(), ("name", "what", "scene"))
     if len(items) > SHOWN:
         results().print(f"and {len(items) - SHOWN} more; --json lists all")
 

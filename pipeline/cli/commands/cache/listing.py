@@ -88,6 +88,8 @@ def list_entries(folder: str | None, selection: Selection, as_json: bool) -> Non
     table = Table("product", "dataset", "scene", "size", "age", "last used", "made in", "key", "settings", box=None)
     for column in table.columns:
         column.no_wrap = True
+    for column in table.columns[3:7]:
+        column.justify = "right"
     for entry in entries:
         label = [escape(entry.label.get(name, "")) for name in ("product", "dataset", "scene")]
         times = (_age(entry.created), _age(_time(used(entry.key))), f"{entry.seconds:.2f} s")
@@ -141,7 +143,7 @@ def print_sizes(folder: str | None, as_json: bool) -> None:
         return
     console = results()
     console.print(f"{store.root}", style="bold", markup=False)
-    console.print(_sizes_table(sizes.stages, parts))
+    print_table(_sizes_table(sizes.stages, parts), console)
 
 
 def _sizes_table(products: Mapping[str, int], parts: Mapping[str, int]) -> Table:

@@ -36,6 +36,8 @@ def check(spec: str, scenes: Sequence[str], as_json: bool) -> bool:
 
 def _print(found: Sequence[Checked]) -> None:
     table = Table("scene", "rows x columns", "truth px", "known %", "visible %", "correlation", "verdict", box=None)
+    for column in table.columns[1:6]:
+        column.justify = "right"
     for each in found:
         table.add_row(*_cells(each))
     console = results()

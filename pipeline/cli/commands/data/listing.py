@@ -25,7 +25,7 @@ def list_datasets(data: Path, as_json: bool) -> None:
     table = Table("dataset", "what it is", box=None)
     for pattern, about in rows:
         table.add_row(escape(pattern), escape(about))
-    results().print(table)
+    print_table(table, results())
     _print_publications([_publication_row(each, data) for each in offered], data)
 
 
@@ -45,6 +45,8 @@ def _publication_row(each: Publication, data: Path) -> dict[str, Any]:
 
 def _print_publications(rows: list[dict[str, Any]], data: Path) -> None:
     table = Table("fetch", "here", "about", "licence", "cite", "page", box=None)
+    for column in table.columns:
+        column.no_wrap = True
     for row in rows:
         size = bytes_text(row["megabytes"] * 1_000_000) if row["megabytes"] else "?"
         mark = "" if row["confirmed"] else " *"
@@ -68,10 +70,12 @@ def list_scenes(dataset: str, as_json: bool) -> None:
         print_json({"dataset": dataset, "scenes": [_scene_row(scene) for scene in scenes]})
         return
     table = Table("scene", "rows x columns", "disparities px", "split", "truth", box=None)
+    for column in table.columns[1:]:
+        column.no_wrap = True
     for scene in scenes:
         size, bounds = f"{scene.size[0]} x {scene.size[1]}", f"{scene.disparities.minimum}..{scene.disparities.maximum}"
         table.add_row(escape(scene.name), size, bounds, scene.split, "yes" if scene.has_truth else "no")
-    results().print(table)
+    print_table(table, results())
 
 
 def _scene_row(scene: SceneSource) -> dict[str, Any]:
