@@ -19,6 +19,8 @@ _MARKED = 5
 """Values of R that are written beside a curve, at most."""
 _DOTS = 25
 """Points of a curve that are drawn as dots, at most: more make a band."""
+_MOST = 99.0
+"""Invalid pixels up to which a curve is drawn, percent."""
 _COLUMNS = 64
 """Characters in a line of the legend."""
 _DASHES = ("-", "--", ":", "-.")
@@ -47,12 +49,13 @@ def error_curve_figure(
 
     Returns:
         A figure: x is the percentage of invalid pixels, y the percentage of wrong ones among the reported. The
-        mean is drawn where every scene of it reports something; some values of R are written beside it.
+        mean is drawn where every scene of it reports something; some values of R are written beside it. A curve ends
+        where a scene reports fewer than one pixel in a hundred: the error of a handful of pixels is chance.
 
     Raises:
         UsageError: if no row is left.
     """
-    chosen = [row for row in rows if row["mask"] == mask and row["threshold_px"] == threshold and "R" in row]
+    chosen = _steady(row for row in rows if (row["mask"], row["threshold_px"]) == (mask, threshold) and "R" in row)
     curves = _by(chosen, lambda row: _named(str(row["scene"]), row))
     drawn = {name: points for name, of in curves.items() if (points := _points(of))}
     if not drawn:
@@ -70,6 +73,17 @@ def error_curve_figure(
     _label(axes, mask, threshold)
     _legend(figure, axes)
     return figure
+
+
+def _steady(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows, without the error of a handful of pixels; as they are if no row reports more."""
+    every = list(rows)
+    steady = [row if row["invalid"] <= _MOST else _without_error(row) for row in every]
+    return steady if any("bad" in row for row in steady) else every
+
+
+def _without_error(row: Row) -> Row:
+    return {name: value for name, value in row.items() if name != "bad"}
 
 
 def _by(rows: Iterable[Row], name: Callable[[Row], str]) -> dict[str, list[Row]]:

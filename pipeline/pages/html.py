@@ -73,22 +73,28 @@ _BAR = 7.5
 
 
 def disparity_legend(span: tuple[float, float], none: str) -> Html:
-    """Return the legend of a disparity map; ``none`` says what black means."""
+    """Return the legend of a disparity map; ``none`` says what black means, and is empty where nothing is black."""
     ends = (f"{span[0]:g} px (far)", f"{span[1]:g} px (near)")
     return _gradient(disparity_colours(), ends, (0, 1)) + swatch(NONE, none)
 
 
 def confidence_legend(none: str = "none") -> Html:
-    """Return the legend of a confidence map: a bar between each two confidences that are named."""
+    """Return the legend of a confidence map: a bar between each two confidences that are named; black as above."""
     shares = confidence_share(np.array(CONFIDENCE_TICKS)).tolist()
     return _gradient(confidence_colours(), [f"{each:g}" for each in CONFIDENCE_TICKS], shares) + swatch(NONE, none)
 
 
-def error_legend(shares: Sequence[str] = (), none: str = "no disparity") -> Html:
-    """Return the legend of a map of errors; with the share of each class, if ``shares`` are given."""
+def error_legend(shares: Sequence[str] = (), none: str = "no disparity", unknown: str = "truth unknown") -> Html:
+    """Return the legend of a map of errors.
+
+    Args:
+        shares: the share of each class, to be written beside it.
+        none: what black means; empty where the map has no black pixel.
+        unknown: what gray means; empty where the map has no gray pixel.
+    """
     told = [f"{label}: {share}" for label, share in zip(ERROR_LABELS, shares, strict=True)] if shares else ERROR_LABELS
     classes = [swatch(colour, label) for colour, label in zip(ERROR_COLOURS, told, strict=True)]
-    return "".join([*classes, swatch(NONE, none), swatch(UNKNOWN, "truth unknown")])
+    return "".join([*classes, swatch(NONE, none), swatch(UNKNOWN, unknown)])
 
 
 def _gradient(colours: Colormap, labels: Sequence[str], places: Sequence[float]) -> Html:
@@ -105,5 +111,6 @@ def _bar(colours: Colormap, start: float, end: float, width: str) -> Html:
 
 
 def swatch(colour: str, label: str) -> Html:
-    """Return a legend entry: a colour and its meaning."""
-    return tag("span", tag("span", class_="swatch", style=f"background: {colour}"), text(label), class_="key")
+    """Return a legend entry: a colour and its meaning; nothing for a colour without one."""
+    box = tag("span", class_="swatch", style=f"background: {colour}")
+    return tag("span", box, text(label), class_="key") if label else ""

@@ -51,13 +51,13 @@ class SceneMaps:
         Raises:
             CacheError: if one of them is missing or damaged.
         """
-        shown = ("images", "disparity", "confidence", "truth")
+        shown = ("images", "disparity", "confidence", "truth", "semidense")
         arrays = {product: store.arrays(keys[product]) for product in shown if product in keys}
         height, width = (arrays["images"]["left"] if "images" in arrays else arrays["disparity"]["disparity"]).shape[:2]
         step = step_for(height, width)
         maps = {
             name: thinned(arrays[name]["confidence" if name == "confidence" else "disparity"], step)
-            for name in shown[1:]
+            for name in shown[1:4]
             if name in arrays
         }
         return cls(
@@ -71,6 +71,11 @@ class SceneMaps:
             mask_kind=MASK_KINDS[int(np.asarray(arrays["truth"]["mask_kind"][...])[0])] if "truth" in arrays else "",
             _arrays=arrays,
         )
+
+    @cached_property
+    def kept(self) -> NDArray[np.float32] | None:
+        """The cached filtered map, (y, x) float32, px, NaN not kept; None if it is not cached."""
+        return thinned(self._arrays["semidense"]["disparity"], self.step) if "semidense" in self._arrays else None
 
     @cached_property
     def tally(self) -> Tally | None:

@@ -9,8 +9,22 @@ from semidense.cache.entries.index import Index, inputs_of
 from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.environment import former_version
 from semidense.pipeline.results.text import value_text
+from semidense.stages.evaluation.filtering import SemidenseParams
 
 DEFAULTS = "defaults"
+
+
+def filter_text(params: SemidenseParams) -> str:
+    """Return by what a map is filtered, to be read after "kept at".
+
+    >>> filter_text(SemidenseParams()), filter_text(SemidenseParams(density=0.6))
+    ('R = 0.9', 'a density of 60 %')
+    """
+    if params.density is not None:
+        return f"a density of {100 * params.density:g} %"
+    if params.max_error is not None:
+        return f"an expected error of {100 * params.max_error:g} %"
+    return f"R = {params.R:g}{', calibrated' * params.calibrated}"
 
 
 class Settings:

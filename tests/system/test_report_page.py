@@ -3,12 +3,14 @@
 import re
 import time
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from semidense.pipeline.api import Task, sweep
+from semidense.pipeline.api import Task, run, sweep
 from semidense.pipeline.pages.report import report
 from tests.system.conftest import NARROW, SCREENS, WIDE, Seen
 
@@ -129,3 +131,37 @@ def test_the_curve_is_the_sweep_s(look: Callable[..., Seen], address: str, own_t
     for row in rows:
         if "bad" in row:  # else nothing is kept, and the curve has no point
             assert f"{row['R']:g} {row['invalid']:.2f} {row['bad']:.2f}" in told
+
+
+def test_a_density_is_told_instead_of_a_threshold(look: Callable[..., Seen], own_task: Task, tmp_path: Path) -> None:
+    task = replace(own_task, settings=[*own_task.settings, "semidense.density=0.4"])
+    made = run(task)
+    page: Any = look(report(task, tmp_path / "density.html").as_uri()).page
+    (row,) = [row for row in made.metrics if row["mask"] == "nonocc" and row["threshold_px"] == 1]
+    share = f"{100 - row['invalid']:.1f} %"
+    told = page.locator(".card").all_inner_texts()
+    assert f"{share}\nof the nonocc pixels kept at a density of 40 %" in told
+    assert not any("R =" in each for each in told)
+    assert page.locator("caption").first.inner_text().endswith("kept at a density of 40 %")
+    last = page.locator(".gallery figure").last
+    assert last.locator("figcaption").inner_text() == "kept at a density of 40 %"
+    assert f"kept: {share} of the nonocc pixels" in last.inner_text()
+
+
+def test_a_legend_names_only_colours_that_the_picture_has(look: Callable[..., Seen], address: str) -> None:
+    page: Any = look(address).page
+    legends = {
+        figure.locator("figcaption").inner_text(): figure.locator(".legend").inner_text()
+        for figure in page.locator(".gallery figure").all()
+    }
+    for title in ("raw disparity, before filtering", "confidence", "error of the raw disparity"):
+        assert not any(word in legends[title] for word in ("none", "no disparity")), "every pixel has a disparity"
+    assert "not kept" in legends["kept at R = 0.5"]
+
+
+def test_notes_are_printed_no_larger_than_tables(look: Callable[..., Seen], address: str) -> None:
+    page: Any = look(address).page
+    page.emulate_media(media="print")
+    sizes = "[...document.querySelectorAll('caption, .quiet, td')].filter((each) => each.offsetParent)"
+    points = page.evaluate(f"{sizes}.map((each) => parseFloat(getComputedStyle(each).fontSize))")
+    assert max(points) == pytest.approx(8 * 96 / 72, abs=0.1), "8 pt, in px of the screen"

@@ -11,9 +11,14 @@ _COLUMNS = ("pixels", "raw_bad", "bad", "invalid", "avgerr", "rms")
 _NONE_CACHED = "No other matcher is cached for these scenes. Run `pipeline compare` to add some to this table."
 
 
-def metrics_tables(rows: Sequence[Row], R: float) -> Html:
-    """Return the table at ``THRESHOLD``, and below it, folded, the table of all thresholds and masks."""
-    caption = f"Errors above {THRESHOLD:g} px, mask {MASK}, R = {R:g}"
+def metrics_tables(rows: Sequence[Row], kept: str) -> Html:
+    """Return the table at ``THRESHOLD``, and below it, folded, the table of all thresholds and masks.
+
+    Args:
+        rows: metrics rows.
+        kept: by what the maps are filtered, as ``filter_text`` says it.
+    """
+    caption = f"Errors above {THRESHOLD:g} px, mask {MASK}, kept at {kept}"
     every = [[row["scene"], row["mask"], f"{row['threshold_px']:g}", *_cells(row)] for row in with_means(rows)]
     head = [FIGURES[name].head for name in _COLUMNS]
     more = table(["scene", "mask", "threshold (px)", *head], every, caption="All thresholds and masks", words=2)

@@ -1,6 +1,6 @@
 """The pictures of a scene side by side, which zoom and move together."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,19 +17,29 @@ from semidense.pipeline.pages.report.pictures import (
     photo,
 )
 from semidense.pipeline.pages.scene_maps import SceneMaps
-from semidense.pipeline.results.metric_rows import MASK, THRESHOLD
-from semidense.stages.evaluation.filtering import keep_confident
-from semidense.stages.metrics.tally import Tally
+from semidense.pipeline.results.metric_rows import MASK, THRESHOLD, Row
+from semidense.pipeline.results.settings import filter_text
+from semidense.stages.evaluation.filtering import SemidenseParams, keep_confident
+
+_USUAL = (0.5, 0.7)
+"""The thresholds R that every scene is shown at, beside the filter of the configuration."""
 
 
-def gallery(name: str, maps: SceneMaps, thresholds: tuple[float, ...]) -> Html:
-    """Return the pictures of a scene: view, truth, raw map, its error, confidence, and the filtered map at each R."""
+def gallery(name: str, maps: SceneMaps, filtering: SemidenseParams, rows: Sequence[Row]) -> Html:
+    """Return the pictures of a scene: view, truth, raw map, its error, confidence, and filtered maps.
+
+    Args:
+        name: of the scene.
+        maps: its maps.
+        filtering: what the configuration keeps of a map; its result is the last picture.
+        rows: the metrics rows of that result; empty if they are not cached.
+    """
     height, width = maps.size
     shown = f", every {maps.step}. row and column shown" if maps.step > 1 else ""
     mask = f"; mask nonocc: {maps.mask_kind}" if maps.mask_kind else ""
     about = tag("p", text(f"{width} x {height} px{shown}{mask}"), class_="quiet about")
     ratio = f"aspect-ratio: {width} / {height}"
-    figures = [_figure(picture, ratio) for picture in _pictures(maps, thresholds)]
+    figures = [_figure(picture, ratio) for picture in _pictures(maps, filtering, rows)]
     grid = tag("div", *figures, class_="gallery")
     return tag("section", tag("h3", text(name)), about, _zoom(name), grid, class_="scene", data_scene=name)
 
@@ -48,7 +58,7 @@ def _figure(picture: Picture, ratio: str) -> Html:
     return tag("figure", tag("figcaption", text(picture.title)), frame, tag("div", picture.legend, class_="legend"))
 
 
-def _pictures(maps: SceneMaps, thresholds: tuple[float, ...]) -> Iterator[Picture]:
+def _pictures(maps: SceneMaps, filtering: SemidenseParams, rows: Sequence[Row]) -> Iterator[Picture]:
     if maps.left is not None:
         yield photo("left image", maps.left)
     span = _span(maps)
@@ -63,10 +73,17 @@ def _pictures(maps: SceneMaps, thresholds: tuple[float, ...]) -> Iterator[Pictur
     if maps.confidence is None:
         return
     yield confidence_picture("confidence", maps.confidence)
-    for R in thresholds:
+    by_tally = filtering.by_R and not filtering.calibrated
+    for R in sorted({*_USUAL, filtering.R} if by_tally else _USUAL):
         kept = keep_confident(maps.disparity, maps.confidence, R)
-        picture = disparity_picture(f"kept at R = {R:g}", kept, span, "not kept")
-        yield replace(picture, legend=picture.legend + _told(maps.tally, R, kept))
+        yield _filtered(f"R = {R:g}", kept, span, _at(R, maps.tally.rows("", MASK, THRESHOLD) if maps.tally else ()))
+    if not by_tally and maps.kept is not None:
+        chosen = [row for row in rows if (row["mask"], row["threshold_px"]) == (MASK, THRESHOLD)]
+        yield _filtered(filter_text(filtering), maps.kept, span, chosen[0] if chosen else None)
+
+
+def _at(R: float, rows: Sequence[Row]) -> Row | None:
+    return next((row for row in rows if row["R"] == R), None)
 
 
 def _span(maps: SceneMaps) -> tuple[float, float]:
@@ -75,11 +92,14 @@ def _span(maps: SceneMaps) -> tuple[float, float]:
     return disparity_span(np.concatenate(known)) if known else (0, 1)
 
 
-def _told(tally: Tally | None, R: float, kept: NDArray[np.float32]) -> Html:
-    """Return the caption of a filtered map: the share that is kept and, where the truth is known, its error."""
-    rows = [row for row in tally.rows("", MASK, THRESHOLD) if row["R"] == R] if tally else []
-    if not rows:
-        return tag("span", text(f"kept: {percent(np.isfinite(kept))} of all pixels"))
-    share = f"kept: {100 - rows[0]['invalid']:.1f} % of the {MASK} pixels"
-    wrong = f"; {rows[0]['bad']:.1f} % of these are off by more than {THRESHOLD:g} px" if "bad" in rows[0] else ""
-    return tag("span", text(share + wrong))
+def _filtered(how: str, kept: NDArray[np.float32], span: tuple[float, float], row: Row | None) -> Picture:
+    """Return a filtered map, with the share that is kept and, where ``row`` tells it, its error."""
+    picture = disparity_picture(f"kept at {how}", kept, span, "not kept")
+    return replace(picture, legend=picture.legend + tag("span", text(_told(kept, row))))
+
+
+def _told(kept: NDArray[np.float32], row: Row | None) -> str:
+    if row is None:
+        return f"kept: {percent(np.isfinite(kept))} of all pixels"
+    wrong = f"; {row['bad']:.1f} % of these are off by more than {THRESHOLD:g} px" if "bad" in row else ""
+    return f"kept: {100 - row['invalid']:.1f} % of the {MASK} pixels{wrong}"

@@ -72,14 +72,14 @@ class Gathered:
         plan: the plan of a run up to ``metrics``, every step with its state.
         store: the cache.
         scenes: the scenes of the task for which something is cached.
-        R: the threshold of the configuration.
+        filtering: what the configuration keeps of a map.
     """
 
     task: Task
     plan: Plan
     store: Store
     scenes: tuple[GatheredScene, ...]
-    R: float
+    filtering: SemidenseParams
 
     @property
     def hits(self) -> list[Planned]:
@@ -129,4 +129,4 @@ def gather(task: Task) -> Gathered:
     if not scenes:
         raise UsageError(f"nothing of {task.dataset} is cached in {store.root}: make it with `{run_command(task)}`")
     config = next(iter(request.configs.values()))
-    return Gathered(task, plan, store, tuple(scenes), config.of("semidense", SemidenseParams).R)
+    return Gathered(task, plan, store, tuple(scenes), config.of("semidense", SemidenseParams))

@@ -24,6 +24,7 @@ from semidense.pipeline.pages.report.graph import graph, steps_table
 from semidense.pipeline.pages.report.networks import networks
 from semidense.pipeline.pages.report.pictures import svg
 from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, averaged
+from semidense.pipeline.results.settings import filter_text
 from semidense.pipeline.results.text import time_text
 from semidense.stages.metrics.tally import Tally
 
@@ -83,7 +84,7 @@ def _cards(found: Gathered) -> Html:
     if not rows:
         return ""
     mean = averaged(rows)[0]
-    cards = [(value, about) for name, value, about in _figures(mean, found.R) if name in mean]
+    cards = [(value, about) for name, value, about in _figures(mean, filter_text(found.filtering)) if name in mean]
     return tag(
         "div",
         *(tag("div", tag("b", text(value)), tag("span", text(about)), class_="card") for value, about in cards),
@@ -91,21 +92,22 @@ def _cards(found: Gathered) -> Html:
     )
 
 
-def _figures(mean: Mapping[str, Any], R: float) -> list[tuple[str, str, str]]:
+def _figures(mean: Mapping[str, Any], kept: str) -> list[tuple[str, str, str]]:
     wrong = f"off by more than {THRESHOLD:g} px"
     auc = f"AUC of the confidence ({MASK}, {THRESHOLD:g} px); a perfect order has {mean.get('auc_optimal', 0):.4f}"
     return [
         ("raw_bad", f"{mean.get('raw_bad', 0):.1f} %", f"of the {MASK} pixels {wrong} before filtering"),
-        ("invalid", f"{100 - mean.get('invalid', 0):.1f} %", f"of the {MASK} pixels kept at R = {R:g}"),
+        ("invalid", f"{100 - mean.get('invalid', 0):.1f} %", f"of the {MASK} pixels kept at {kept}"),
         ("bad", f"{mean.get('bad', 0):.1f} %", f"of the kept {MASK} pixels {wrong}"),
         ("auc", f"{mean.get('auc', 0):.4f}", auc),
     ]
 
 
 def _parts(found: Gathered) -> Iterator[tuple[str, Html]]:
-    thresholds = tuple(sorted({0.5, 0.7, found.R}))
-    yield "Pictures", "".join(gallery(scene.name, scene.maps, thresholds) for scene in found.scenes if scene.maps)
-    yield "Figures", metrics_tables(found.rows, found.R) + _note() if found.rows else ""
+    kept = filter_text(found.filtering)
+    shown = [(scene, scene.maps) for scene in found.scenes if scene.maps]
+    yield "Pictures", "".join(gallery(scene.name, maps, found.filtering, scene.rows) for scene, maps in shown)
+    yield "Figures", metrics_tables(found.rows, kept) + _note() if found.rows else ""
     yield "Error against invalid pixels", _curves(found)
     yield "Confidence", _confidence(found)
     yield _BEHIND, _behind(found)
@@ -138,7 +140,8 @@ def _note() -> Html:
         "the truth is known. raw bad: wrong pixels of the map before filtering; a pixel without a disparity is wrong. "
         "invalid: pixels that the filtered map does not keep. bad: wrong pixels among those that it keeps. avgerr, "
         "rms: mean and root mean squared error of the kept pixels. Thresholds are in pixels of the image at hand. A "
-        "figure that one scene lacks has no mean."
+        "figure that one scene lacks has no mean. Where the data set publishes no mask, hidden pixels are found by "
+        "warping the truth into the right view, or by comparing the truths of both views."
     )
     return tag("p", text(told), class_="quiet")
 

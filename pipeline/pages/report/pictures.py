@@ -60,13 +60,15 @@ def photo(title: str, view: NDArray[np.uint8]) -> Picture:
 
 
 def disparity_picture(title: str, disparity: NDArray[Any], span: tuple[float, float], none: str) -> Picture:
-    """Return a disparity map; ``none`` says what a missing value means."""
-    return Picture(title, _scaled(disparity, span, disparity_colours()), disparity_legend(span, none))
+    """Return a disparity map; ``none`` says what a missing value means, if there is one."""
+    legend = disparity_legend(span, none if np.isnan(disparity).any() else "")
+    return Picture(title, _scaled(disparity, span, disparity_colours()), legend)
 
 
 def confidence_picture(title: str, confidence: NDArray[Any]) -> Picture:
     """Return a confidence map on the scale of log-odds."""
-    return Picture(title, _scaled(confidence_share(confidence), (0, 1), confidence_colours()), confidence_legend())
+    legend = confidence_legend("none" if np.isnan(confidence).any() else "")
+    return Picture(title, _scaled(confidence_share(confidence), (0, 1), confidence_colours()), legend)
 
 
 def _scaled(values: NDArray[Any], span: tuple[float, float], colours: Colormap) -> str:
@@ -88,7 +90,8 @@ def error_picture(title: str, error: NDArray[Any], truth: NDArray[Any], nonocc: 
     levels = np.where(unknown, 1, np.where(none, 0, classes)).astype(np.uint8)
     counted = levels[nonocc & ~unknown]
     shares = [percent(counted == index + 2) for index in range(len(ERROR_COLOURS))]
-    legend = error_legend(shares, f"no disparity: {percent(counted == 0)}")
+    none_told = f"no disparity: {percent(counted == 0)}" if none.any() else ""
+    legend = error_legend(shares, none_told, "truth unknown" if unknown.any() else "")
     told = tag("span", text("shares of the nonocc pixels:"))
     return Picture(title, _indexed(levels, [NONE, UNKNOWN, *ERROR_COLOURS]), told + legend)
 

@@ -41,6 +41,15 @@ def test_the_mean_stops_where_a_scene_reports_nothing() -> None:
     assert curves(rows)["mean of 2 scenes"] == [(5, 6), (50, 2)]
 
 
+def test_a_curve_ends_where_a_handful_of_pixels_is_left() -> None:
+    assert curves([*ROWS, row("a", 0.99, 99.5, 50), row("b", 0.99, 80, 1)]) == {
+        "a": [(0, 8), (40, 1)],
+        "b": [(10, 4), (60, 3), (80, 1)],
+        "mean of 2 scenes": [(5, 6), (50, 2)],
+    }
+    assert curves([row("a", 0.9, 99.5, 50)]) == {"a": [(99.5, 50)]}, "a point that is alone is shown"
+
+
 def test_there_is_no_mean_where_a_scene_never_reports_anything() -> None:
     assert list(curves([*ROWS, row("c", 0.1, 100, None), row("c", 0.9, 100, None)])) == ["a", "b"]
 

@@ -3,7 +3,8 @@ from dataclasses import dataclass
 import pytest
 
 from semidense.cache import Recipe
-from semidense.pipeline.results.settings import DEFAULTS, Settings
+from semidense.pipeline.results.settings import DEFAULTS, Settings, filter_text
+from semidense.stages.evaluation.filtering import SemidenseParams
 
 
 @dataclass(frozen=True)
@@ -29,3 +30,16 @@ class Made:
 def test_the_settings_that_are_not_the_defaults_are_named(params: dict[str, object], text: str) -> None:
     entry = Made(Recipe("costvolume", {}, params, {}, {}))
     assert Settings([entry]).text(entry) == text  # type: ignore[list-item, arg-type]
+
+
+@pytest.mark.parametrize(
+    ("params", "text"),
+    [
+        pytest.param({}, "R = 0.9", id="the paper's"),
+        pytest.param({"R": 0.5, "density": 0.625}, "a density of 62.5 %", id="a density replaces R"),
+        pytest.param({"max_error": 0.01}, "an expected error of 1 %", id="so does an expected error"),
+        pytest.param({"R": 0.95, "calibrated": True}, "R = 0.95, calibrated", id="R as a probability"),
+    ],
+)
+def test_what_a_map_is_filtered_by_is_told(params: dict[str, float], text: str) -> None:
+    assert filter_text(SemidenseParams(**params)) == text
