@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from semidense.pipeline.figures.colours import LINES
 from semidense.pipeline.figures.drawing import new_figure
 from semidense.pipeline.plan.errors import UsageError
-from semidense.pipeline.results.metric_rows import Row, mean_name, mean_rows
+from semidense.pipeline.results.metric_rows import Row, mean_name, mean_rows, without_chance
 
 Curve = dict[float, tuple[float, float]]
 """R -> (invalid, bad), both in percent."""
@@ -19,8 +19,6 @@ _MARKED = 5
 """Values of R that are written beside a curve, at most."""
 _DOTS = 25
 """Points of a curve that are drawn as dots, at most: more make a band."""
-_MOST = 99.0
-"""Invalid pixels up to which a curve is drawn, percent."""
 _COLUMNS = 64
 """Characters in a line of the legend."""
 _DASHES = ("-", "--", ":", "-.")
@@ -55,7 +53,8 @@ def error_curve_figure(
     Raises:
         UsageError: if no row is left.
     """
-    chosen = _steady(row for row in rows if (row["mask"], row["threshold_px"]) == (mask, threshold) and "R" in row)
+    chosen = [row for row in rows if row["mask"] == mask and row["threshold_px"] == threshold and "R" in row]
+    chosen = without_chance(chosen)
     curves = _by(chosen, lambda row: _named(str(row["scene"]), row))
     drawn = {name: points for name, of in curves.items() if (points := _points(of))}
     if not drawn:
@@ -73,17 +72,6 @@ def error_curve_figure(
     _label(axes, mask, threshold)
     _legend(figure, axes)
     return figure
-
-
-def _steady(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows, without the error of a handful of pixels; as they are if no row reports more."""
-    every = list(rows)
-    steady = [row if row["invalid"] <= _MOST else _without_error(row) for row in every]
-    return steady if any("bad" in row for row in steady) else every
-
-
-def _without_error(row: Row) -> Row:
-    return {name: value for name, value in row.items() if name != "bad"}
 
 
 def _by(rows: Iterable[Row], name: Callable[[Row], str]) -> dict[str, list[Row]]:

@@ -52,6 +52,8 @@ FIGURES = {
     "auc_optimal": Figure("AUC optimal", "1", 4, "area that a perfect confidence would reach"),
 }
 """Every figure of a row or of the product ``metrics``, in the order of columns."""
+_MOST = 99.0
+"""Invalid pixels up to which an error is more than chance, percent."""
 _ALIKE = ("experiment", "method", "variant", "mask", "threshold_px", "R")
 
 
@@ -77,6 +79,19 @@ def _mean(rows: Sequence[Row]) -> dict[str, Any]:
     means = {name: sum(row[name] for row in rows) / len(rows) for name in shared}
     same = {name: value for name, value in rows[0].items() if name not in FIGURES}
     return same | {"scene": mean_name(len(rows))} | means | {"pixels": sum(row["pixels"] for row in rows)}
+
+
+def without_chance(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows of a curve, without ``bad`` where fewer than one pixel in a hundred is reported.
+
+    The error of a handful of pixels is chance. The rows are returned as they are if no row reports more.
+    """
+    steady = [row if row["invalid"] <= _MOST else _without_error(row) for row in rows]
+    return steady if any("bad" in row for row in steady) else [*rows]
+
+
+def _without_error(row: Row) -> Row:
+    return {name: value for name, value in row.items() if name != "bad"}
 
 
 def with_means(rows: Sequence[Row]) -> list[Row]:

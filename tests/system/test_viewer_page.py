@@ -241,6 +241,9 @@ def test_maps_can_be_made_larger(seen: Seen) -> None:
     seen.page.evaluate(f"{model('size')}.value = 'full width'")
     seen.page.wait_for_timeout(1000)
     assert box(seen, "raw")["w"] > 2.5 * before
+    every = [box(seen, name) for name in ("left", "truth", "raw", "confidence", "kept", "error")]
+    assert {each["w"] for each in every} == {box(seen, "raw")["w"]}, "each map has a row of its own"
+    assert [each["y"] for each in every] == sorted({each["y"] for each in every})
     seen.page.evaluate(f"{model('size')}.value = 'small maps'")
 
 
@@ -252,7 +255,21 @@ def test_it_follows_a_dark_setting(look: Look, small: Running) -> None:
     ink = seen.page.evaluate(f"{model('curve')}.below[0].axis_label_text_color")
     assert paper == "rgb(20, 24, 29)"
     assert ink == "#e8ebef"
+    arrow = "(each) => getComputedStyle(each).backgroundImage"
+    assert "rgb(232, 235, 239)" in seen.page.locator("select").first.evaluate(arrow), "it can be seen on dark paper"
     assert seen.said == []
+
+
+def test_the_curve_ends_where_a_handful_of_pixels_is_left(seen: Seen) -> None:
+    table = f"{model('table')}.data"
+    drawn, bad, invalid = (list(seen.page.evaluate(f"[...{table}.{name}]")) for name in ("drawn", "bad", "invalid"))
+    few = [share > 99 for share in invalid]
+    assert any(few)
+    assert not all(few)
+    assert all(np.isnan(each) for each, alone in zip(drawn, few, strict=True) if alone)
+    assert [each for each, alone in zip(drawn, few, strict=True) if not alone] == [
+        each for each, alone in zip(bad, few, strict=True) if not alone
+    ]
 
 
 def test_maps_zoom_together(seen: Seen) -> None:

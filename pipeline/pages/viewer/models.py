@@ -27,9 +27,12 @@ ERROR = "error"
 SWIPED = ("kept at R", "raw disparity", ERROR, "confidence")
 """Maps by which two configurations can be compared."""
 _POINT = ("invalid", "bad", "label", "side", "colour")
-SIZES = {"small maps": "17rem", "large maps": "34rem", "full width": "100%"}
-"""The least width of a map on the page, by what a user calls it."""
-FIGURES = ("R", "invalid", "bad", "avgerr", "rms")
+SIZES = {"small maps": ("17rem", "span 2"), "large maps": ("34rem", "1 / -1"), "full width": ("100%", "1 / -1")}
+"""The least width of a map, and the columns of the grid that the curve takes, by what a user calls the size.
+
+A curve that asks for two columns where only one fits makes a second one of no width, and hides every second map."""
+FIGURES = ("R", "invalid", "bad", "avgerr", "rms", "drawn")
+"""Columns of a table of figures; ``drawn`` is ``bad`` where the curve is drawn."""
 
 
 def script(name: str) -> str:
@@ -147,7 +150,7 @@ class Panels:
         self.costs_box = Column(
             self.costs, words("cost-legend", COST_LEGEND), sizing_mode="stretch_width", visible=False
         )
-        self.patches = patch_chart("patches", sources.patches, {"patch": gray_mapper()}, 38, 53)
+        self.patches = patch_chart("patches", sources.patches, {"patch": gray_mapper()}, 38, 57)
         self.seen_scale = scales()["disparity"]
         self.seen = patch_chart("seen", sources.gray, {"gray": gray_mapper()}, 210, 112)
         self.seen.image(
@@ -209,4 +212,6 @@ def connect(controls: Controls, sources: Sources, panels: Panels) -> list[Custom
     return [keep, swipe, CustomJS(args={"charts": [*panels.charts]}, code=script("scheme"))]
 
 
-_RESIZE = "document.documentElement.style.setProperty('--map', sizes[cb_obj.value])"
+_RESIZE = """const [map, curve] = sizes[cb_obj.value]
+document.documentElement.style.setProperty("--map", map)
+document.documentElement.style.setProperty("--curve", curve)"""

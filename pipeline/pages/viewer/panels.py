@@ -53,13 +53,18 @@ summary { cursor: pointer; color: var(--accent); }
 CONTROL = """
 :host { color: var(--ink); } label, .bk-slider-title { color: var(--ink); }
 .bk-input { background-color: var(--paper); color: var(--ink); border-color: var(--line); }
+select.bk-input:not([multiple]) {
+  background-image: conic-gradient(from -34deg at 50% 100%, var(--ink) 68deg, transparent 0);
+}
+.bk-spin-btn.bk-spin-btn-up:before { border-bottom-color: var(--ink); }
+.bk-spin-btn.bk-spin-btn-down:before { border-top-color: var(--ink); }
 .bk-btn, .bk-btn:hover { background-color: var(--soft); color: var(--ink); border-color: var(--line); }
 .bk-btn.bk-active { background-color: var(--accent); color: var(--paper); }
 .noUi-target { background: var(--soft); border-color: var(--line); box-shadow: none; }
 """
 """A style: controls in the page's colours, light or dark."""
-WIDE = ":host { grid-column: span 2; } @media (max-width: 44rem) { :host { grid-column: auto; } }"
-"""A style: the panel takes two columns of the grid if there are several."""
+WIDE = ":host { grid-column: var(--curve, span 2); } @media (max-width: 44rem) { :host { grid-column: auto; } }"
+"""A style: the panel takes two columns of a grid of small maps, and a whole row of others."""
 _FINE = 1000
 """Colours of the confidence: enough for a step of 0.001 at its ends."""
 _HIGHEST = 270
@@ -211,9 +216,9 @@ def chart(name: str, x: str, y: str, height: int = 340, **how: Any) -> Any:  # n
 def curve_chart(table: ColumnDataSource, second: ColumnDataSource, point: ColumnDataSource) -> Any:  # noqa: ANN401
     """Return the curve of error against invalid pixels, that of a second configuration, and the points at the R set."""
     plot = chart("curve", "invalid: pixels that are not kept (%)", "bad: wrong of the kept (%)", 230)
-    plot.line("invalid", "bad", source=second, color=ORANGE, line_width=2, line_dash="dashed")
-    plot.line("invalid", "bad", source=table, color=BLUE, line_width=2)
-    plot.scatter("invalid", "bad", source=table, color=BLUE, size=3)
+    plot.line("invalid", "drawn", source=second, color=ORANGE, line_width=2, line_dash="dashed")
+    plot.line("invalid", "drawn", source=table, color=BLUE, line_width=2)
+    plot.scatter("invalid", "drawn", source=table, color=BLUE, size=3)
     plot.scatter("invalid", "bad", source=point, color="colour", line_color="black", size=14)
     label = {"text": "label", "text_align": "side", "y_offset": -10, "text_font_style": "bold"}
     plot.text("invalid", "bad", source=point, **label)

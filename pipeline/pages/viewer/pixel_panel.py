@@ -13,7 +13,7 @@ from semidense.pipeline.pages.viewer.pixel import CostCurve, evaluation_patch, m
 from semidense.stages.evaluation.declaration import PATCH as EVALUATION_PATCH
 from semidense.stages.matching.declaration import PATCH as MATCHING_PATCH
 
-_GAP, _HEAD = 2, 6.6
+_GAP, _HEAD = 2, 8.0
 """Space between patches and above them, px of the patches."""
 
 

@@ -23,6 +23,7 @@ from semidense.pipeline.pages.viewer.pixel_panel import (
     told_pixel,
 )
 from semidense.pipeline.pages.viewer.provenance import provenance_table
+from semidense.pipeline.results.metric_rows import without_chance
 
 NOTHING = "nothing"
 """The choice of no second configuration."""
@@ -201,7 +202,8 @@ class Session:
         for source, maps in ((self.sources.second, self.compared), (self.sources.table, self.maps)):
             tally = maps.tally if maps else None
             rows = tally.rows("", controls.mask.value, float(controls.threshold.value)) if tally else []
-            source.data = {name: np.array([row.get(name, np.nan) for row in rows]) for name in FIGURES}
+            drawn = [row | {"drawn": kept.get("bad")} for row, kept in zip(rows, without_chance(rows), strict=True)]
+            source.data = {name: np.array([row.get(name, np.nan) for row in drawn], float) for name in FIGURES}
 
     def choose_compared(self) -> None:
         """Read the maps of the second configuration, if there is one, and show the figures of both."""
