@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.pipeline.results.metric_rows import METHOD
+from semidense.pipeline.results.metric_rows import METHOD, without_chance
 from semidense.stages.metrics.confidence import error_at_density
 from semidense.stages.metrics.errors import MASKS, THRESHOLDS, Errors, counted
 from semidense.stages.metrics.ranking import ranked
@@ -16,8 +16,8 @@ from semidense.stages.stage import Arrays
 
 Row = dict[str, Any]
 Mask = NDArray[np.bool_]
-CURVE_R = (*(round(0.05 * step, 2) for step in range(20)), 0.99)
-"""The thresholds of the curve of error against invalid pixels."""
+CURVE_R = (*(round(0.05 * step, 2) for step in range(19)), *(0.95, 0.96, 0.97, 0.98, 0.99, 0.995, 0.998, 0.999))
+"""The thresholds of the curve of error against invalid pixels: closer near 1, where half of the pixels may lie."""
 
 
 @dataclass(frozen=True)
@@ -91,11 +91,11 @@ def _error_at(density: float, row: Row, judged: Judged, ours: Mapping[str, NDArr
 
 
 def curve_rows(judged: Judged, ours: Mapping[str, NDArray[np.float32]]) -> Iterator[Row]:
-    """Yield error and invalid pixels of our map for every R of ``CURVE_R``."""
+    """Yield invalid pixels and error of our map for every R of ``CURVE_R``; no error where it would be chance."""
     maps = Block(ours["disparity"], ours["confidence"], judged.disparity, judged.truth["nonocc"])
     tally = Tally.of([maps], CURVE_R)
     for row, _, threshold in judged.rows("curve", METHOD):
-        for point in tally.rows(judged.scene, row["mask"], threshold):
+        for point in without_chance(tally.rows(judged.scene, row["mask"], threshold)):
             yield row | {name: point[name] for name in ("R", "bad", "invalid") if name in point}
 
 
