@@ -1,9 +1,12 @@
 """Figures of what has the image's rows and columns: images, truth, channels, disparities, confidence."""
 
+from typing import Any
+
 import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from semidense.pipeline.figures.colours import NONE, ORANGE, SKY, view_rgb
 from semidense.pipeline.figures.drawing import (
@@ -77,7 +80,13 @@ def draw_disparity(figure: Figure, dataset: xr.Dataset) -> None:
     disparity = dataset["disparity"].values
     axes = image_panels(figure, disparity.shape)[0, 0]
     draw_map(axes, disparity, disparity_scale(disparity))
-    legend_below(figure, (none_patch(disparity),))
+    _tell_none(figure, disparity)
+
+
+def _tell_none(figure: Figure, values: NDArray[Any]) -> None:
+    """Tell the share of pixels without a value below a map; nothing where each pixel has one."""
+    if not np.isfinite(values).all():
+        legend_below(figure, (none_patch(values),))
 
 
 def draw_confidence(figure: Figure, dataset: xr.Dataset) -> None:
@@ -86,7 +95,7 @@ def draw_confidence(figure: Figure, dataset: xr.Dataset) -> None:
     axes = image_panels(figure, confidence.shape)[0, 0]
     draw_map(axes, confidence, confidence_scale())
     axes.set_title("probability that the disparity is right")
-    legend_below(figure, (none_patch(confidence),))
+    _tell_none(figure, confidence)
 
 
 def draw_any(figure: Figure, dataset: xr.Dataset) -> None:
@@ -104,4 +113,4 @@ def draw_any(figure: Figure, dataset: xr.Dataset) -> None:
         values = array.values.astype(np.float32)
         draw_map(each, values, disparity_scale(values, f"{array.name} ({array.attrs.get('units', '1')})"))
         each.set_title(str(array.attrs.get("long_name", array.name)))
-    legend_below(figure, [none_patch(array.values.astype(np.float32)) for array in maps[:1]])
+    _tell_none(figure, maps[0].values.astype(np.float32))

@@ -3,18 +3,26 @@
 The picture is made of pixels, without Matplotlib's figures: these take longer to draw than a pair takes to match.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from semidense.pipeline.figures.colours import NONE, confidence_rgb, disparity_rgb, disparity_span
+from semidense.pipeline.figures.colours import (
+    CONFIDENCE_TICKS,
+    NONE,
+    confidence_at,
+    confidence_rgb,
+    confidence_share,
+    disparity_rgb,
+    disparity_span,
+)
 
 Colours = Callable[[NDArray[Any]], NDArray[np.uint8]]
 """From a map (y, x) to its colours (y, x, 3)."""
@@ -27,19 +35,38 @@ _BESIDE = 7
 """Room at the right for the colour bar and its numbers, letters high."""
 
 
+class Bar(NamedTuple):
+    """A colour bar, whose places go from 0 at its lower end to 1.
+
+    Attributes:
+        values: gives the values at some places.
+        ticks: place and text of the numbers beside it.
+    """
+
+    values: Callable[[NDArray[Any]], NDArray[Any]]
+    ticks: Sequence[tuple[float, str]]
+
+
 def disparity_picture(disparity: NDArray[Any], title: str) -> NDArray[np.uint8]:
     """Return a disparity map (y, x), px, as a picture: (row, column, 3) uint8 RGB, black where there is none."""
-    ends = disparity_span(disparity)
-    return _picture(disparity, partial(disparity_rgb, vmin=ends[0], vmax=ends[1]), ends, title)
+    low, high = disparity_span(disparity)
+    places = np.linspace(0, 1, _TICKS).tolist()
+    bar = Bar(lambda place: low + place * (high - low), [(each, f"{low + each * (high - low):.4g}") for each in places])
+    return _picture(disparity, partial(disparity_rgb, vmin=low, vmax=high), bar, title)
 
 
 def confidence_picture(confidence: NDArray[Any], title: str) -> NDArray[np.uint8]:
-    """Return a confidence map (y, x), in [0, 1], as a picture: (row, column, 3) uint8 RGB, black where it is NaN."""
-    return _picture(confidence, confidence_rgb, (0.0, 1.0), title)
+    """Return a confidence map (y, x), in [0, 1], as a picture: (row, column, 3) uint8 RGB, black where it is NaN.
+
+    The bar is a scale of log-odds, as the colours are: on a straight one most of it would have two colours.
+    """
+    places = confidence_share(np.array(CONFIDENCE_TICKS)).tolist()
+    bar = Bar(confidence_at, [(place, f"{each:g}") for place, each in zip(places, CONFIDENCE_TICKS, strict=True)])
+    return _picture(confidence, confidence_rgb, bar, title)
 
 
-def _picture(values: NDArray[Any], colours: Colours, ends: tuple[float, float], title: str) -> NDArray[np.uint8]:
-    """Return the map under its title, its colour bar at the right, what black means below."""
+def _picture(values: NDArray[Any], colours: Colours, bar: Bar, title: str) -> NDArray[np.uint8]:
+    """Return the map under its title, its colour bar at the right, what black means below if there is any."""
     rgb = _enlarged(colours(values))
     height, width = rgb.shape[:2]
     letter = max(12, max(height, width) // _LETTER)
@@ -50,10 +77,11 @@ def _picture(values: NDArray[Any], colours: Colours, ends: tuple[float, float], 
     for row, line in enumerate(lines):
         pen.text((letter, letter // 2 + row * 3 * letter // 2), line, "black", _font(letter))
     page.paste(Image.fromarray(rgb), (letter, top))
-    _draw_bar(page, pen, (right, top, height, letter), colours, ends)
+    _draw_bar(page, pen, (right, top, height, letter), colours, bar)
     share = 100 * np.count_nonzero(~np.isfinite(values)) / max(values.size, 1)
-    pen.rectangle((letter, top + height + letter, 2 * letter, top + height + 2 * letter), NONE)
-    pen.text((5 * letter // 2, top + height + letter), f"none: {share:.1f} %", "black", _font(letter))
+    if share:
+        pen.rectangle((letter, top + height + letter, 2 * letter, top + height + 2 * letter), NONE)
+        pen.text((5 * letter // 2, top + height + letter), f"none: {share:.1f} %", "black", _font(letter))
     return np.asarray(page)
 
 
@@ -68,16 +96,16 @@ def _draw_bar(
     pen: ImageDraw.ImageDraw,
     place: tuple[int, int, int, int],
     colours: Colours,
-    ends: tuple[float, float],
+    bar: Bar,
 ) -> None:
     """Draw the colours from high to low, with numbers beside them; place: x, y, height, and height of a letter."""
     x, y, height, letter = place
-    column = colours(np.linspace(ends[1], ends[0], height)[:, np.newaxis])
+    column = colours(bar.values(np.linspace(1, 0, height))[:, np.newaxis])
     page.paste(Image.fromarray(column.repeat(letter, axis=1)), (x, y))
-    for value in np.linspace(*ends, _TICKS):
-        row = y + round((height - 1) * (ends[1] - value) / (ends[1] - ends[0]))
+    for tick, told in bar.ticks:
+        row = y + round((height - 1) * (1 - tick))
         pen.line((x + letter, row, x + 4 * letter // 3, row), "black")
-        pen.text((x + 3 * letter // 2, row), f"{value:.4g}", "black", _font(letter), anchor="lm")
+        pen.text((x + 3 * letter // 2, row), told, "black", _font(letter), anchor="lm")
 
 
 @cache

@@ -168,7 +168,8 @@ class _Writer:
         values = {DISPARITY: match.disparity, RAW_DISPARITY: match.raw, CONFIDENCE: match.confidence}[quantity]
         draw = confidence_picture if quantity is CONFIDENCE else disparity_picture
         name = f"{quantity.name}-colour.png"
-        write_rgb(draw(values, f"{match.scene.name}: {quantity.about} ({quantity.unit})"), self.folder / name)
+        unit = "" if quantity.unit == "1" else f" ({quantity.unit})"
+        write_rgb(draw(values, f"{match.scene.name}: {quantity.about}{unit}"), self.folder / name)
         return {"file": name, "quantity": f"picture of {quantity.name}, with a legend", "reference view": "left"}
 
     def _write_guessed(self) -> None:

@@ -81,7 +81,7 @@ def test_every_product_of_the_pipeline_has_a_figure() -> None:
         pytest.param("evaluation_net", ["training step", "training loss (nats, log scale)"], id="shipped-net"),
         pytest.param(
             "confidence",
-            ["probability that the disparity is right", "confidence (0 to 1)", "none: 0.0 %"],
+            ["probability that the disparity is right", "confidence (0 to 1)"],
             id="zero-to-one",
         ),
         pytest.param("distinctiveness", ["left view", "right view", "left (1)"], id="both-views-beside-each-other"),
@@ -102,6 +102,10 @@ def test_a_figure_says_what_it_shows(product: str, expected: list[str]) -> None:
     written = texts(drawn)
     assert [text for text in ["Teddy: a title", *expected] if text not in written] == []
     drawn.draw_without_rendering()
+
+
+def test_a_map_with_a_value_everywhere_has_no_legend_of_none() -> None:
+    assert "none" not in " ".join(texts(figure("confidence", PRODUCTS["confidence"](), title="Teddy: a title")))
 
 
 def test_a_title_is_taken_literally(tmp_path: Path) -> None:

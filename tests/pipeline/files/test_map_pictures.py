@@ -43,3 +43,20 @@ def test_a_long_title_takes_more_lines_above_the_map() -> None:
 def test_a_map_without_any_value_is_black() -> None:
     picture = disparity_picture(np.full((480, 500), np.nan, np.float32), "nothing")
     assert not picture[36 : 36 + 480, 12 : 12 + 500].any()
+
+
+def test_what_black_means_is_told_only_where_there_is_some() -> None:
+    confidence = np.full((480, 500), 0.5, np.float32)
+    below = confidence_picture(confidence, "a title")[36 + 480 + 6 :, : 12 + 500]
+    assert (below == 255).all()
+    confidence[0, 0] = np.nan
+    assert not (confidence_picture(confidence, "a title")[36 + 480 + 6 :, : 12 + 500] == 255).all()
+
+
+def test_the_bar_of_a_confidence_is_one_of_log_odds() -> None:
+    confidence = np.repeat(np.float32([[0.9, 0.1]]), 480, axis=0).repeat(240, axis=1)
+    picture = confidence_picture(confidence, "a title")
+    bar = picture[36 : 36 + 480, 12 + 480 + 12].astype(int)
+    # ln 9 / ln 99 = 0.478 of the way from the middle to an end
+    for column, row in ((12, 240 - 115), (12 + 300, 240 + 115)):
+        assert abs(bar[row - 1 : row + 2] - picture[40, column]).sum(axis=1).min() <= 6
