@@ -25,15 +25,21 @@ Chain = Mapping[str, Entry]
 def names(chains: Sequence[Chain]) -> list[str]:
     """Return a name for each configuration of a scene, no two alike.
 
-    A setting is in it if it is not the default and not the same in all configurations.
+    A setting is in it if it is not the default and not the same in all configurations. The hash of shipped weights is
+    in it only where the rest does not tell all configurations apart.
     """
     settings = [dict(_chosen(chain)) for chain in chains]
     every = dict.fromkeys(name for each in settings for name in each if _in_all(name, chains))
     differing = [name for name in every if len({each.get(name) for each in settings}) > 1]
-    return [
-        _name(chain, [f"{name}={each[name][:24]}" for name in differing if name in each])
-        for chain, each in zip(chains, settings, strict=True)
-    ]
+    plain = [name for name in differing if not name.endswith(".shipped")]
+    heads = [_head(chain, _told(each, plain)) for chain, each in zip(chains, settings, strict=True)]
+    if len(set(heads)) < len(heads):
+        heads = [_head(chain, _told(each, differing)) for chain, each in zip(chains, settings, strict=True)]
+    return [f"{head} - {_when(chain)}" for head, chain in zip(heads, chains, strict=True)]
+
+
+def _told(settings: Mapping[str, str], names: Sequence[str]) -> list[str]:
+    return [f"{name}={settings[name][:24]}" for name in names if name in settings]
 
 
 def _in_all(setting: str, chains: Sequence[Chain]) -> bool:
@@ -41,11 +47,20 @@ def _in_all(setting: str, chains: Sequence[Chain]) -> bool:
     return all(setting.partition(".")[0] in chain for chain in chains)
 
 
-def _name(chain: Chain, settings: list[str]) -> str:
-    mode = [str(chain["costvolume"].recipe.params.get("mode", ""))] if "costvolume" in chain else []
+def _head(chain: Chain, settings: list[str]) -> str:
+    mode = [_mode(chain["costvolume"].recipe.params)] if "costvolume" in chain else []
     parts = [_preset(chain), *mode, *settings[:_SHOWN], "" if "confidence" in chain else "no confidence"]
+    return ", ".join(part for part in parts if part)
+
+
+def _mode(params: Mapping[str, Any]) -> str:
+    """Return the mode of a cost volume; a record of the default mode may not have it."""
+    return str(params.get("mode", STAGES["costvolume"].params.model_fields["mode"].default))
+
+
+def _when(chain: Chain) -> str:
     end = next(iter(chain.values()))
-    return f"{', '.join(part for part in parts if part)} - {time_text(end.created)[:16]} ({end.key[:6]})"
+    return f"{time_text(end.created)[:16]} ({end.key[:6]})"
 
 
 def _preset(chain: Chain) -> str:

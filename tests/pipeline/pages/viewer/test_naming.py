@@ -39,6 +39,20 @@ def test_a_setting_that_differs_is_told() -> None:
     assert shown(wider, wider) == ["robust, fast", "robust, fast"], "what all share sets none apart"
 
 
+def test_the_hash_of_weights_is_told_only_where_nothing_else_differs() -> None:
+    one, other = ({"evaluation_net": entry("evaluation_net", shipped=digest * 16)} for digest in ("abcd", "ef01"))
+    assert shown(PAPER | one, ROBUST | other) == ["paper, exact", "robust, fast"]
+    assert shown(PAPER | one, PAPER | other) == [
+        f"paper, exact, evaluation_net.shipped={digest * 3}" for digest in ("abcd", "ef01")
+    ]
+
+
+def test_the_default_mode_is_told_though_a_record_does_not_have_it() -> None:
+    volume = entry("costvolume")
+    del volume.recipe.params["mode"]
+    assert shown(PAPER | {"costvolume": volume}) == ["paper, exact"]
+
+
 def test_a_mixture_is_no_preset() -> None:
     assert shown(PAPER | {"disparity": entry("aggregated")}) == ["exact"]
 
