@@ -3,9 +3,11 @@
 from collections.abc import Sequence
 from html import escape
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import Colormap, to_hex
+from numpy.typing import NDArray
 
 from semidense.pipeline.figures.colours import (
     CONFIDENCE_TICKS,
@@ -64,6 +66,15 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]], *, caption: str
 def folded(summary: str, *content: Html) -> Html:
     """Return content that stays hidden until the reader opens it."""
     return tag("details", tag("summary", text(summary)), *content)
+
+
+def missing(values: NDArray[Any] | None, what: str = "none") -> str:
+    """Return ``what`` for the legend of a map that lacks values; nothing where every pixel has one.
+
+    >>> missing(np.array([1, np.nan])), missing(np.array([1.0, 2.0]))
+    ('none', '')
+    """
+    return what if values is not None and np.isnan(values).any() else ""
 
 
 _STOPS = 12

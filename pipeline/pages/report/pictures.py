@@ -23,7 +23,7 @@ from semidense.pipeline.figures.colours import (
     disparity_colours,
     error_classes,
 )
-from semidense.pipeline.pages.html import Html, confidence_legend, disparity_legend, error_legend, tag, text
+from semidense.pipeline.pages.html import Html, confidence_legend, disparity_legend, error_legend, missing, tag, text
 
 _OWN = {
     "#000000": "currentColor",
@@ -61,13 +61,13 @@ def photo(title: str, view: NDArray[np.uint8]) -> Picture:
 
 def disparity_picture(title: str, disparity: NDArray[Any], span: tuple[float, float], none: str) -> Picture:
     """Return a disparity map; ``none`` says what a missing value means, if there is one."""
-    legend = disparity_legend(span, none if np.isnan(disparity).any() else "")
+    legend = disparity_legend(span, missing(disparity, none))
     return Picture(title, _scaled(disparity, span, disparity_colours()), legend)
 
 
 def confidence_picture(title: str, confidence: NDArray[Any]) -> Picture:
     """Return a confidence map on the scale of log-odds."""
-    legend = confidence_legend("none" if np.isnan(confidence).any() else "")
+    legend = confidence_legend(missing(confidence))
     return Picture(title, _scaled(confidence_share(confidence), (0, 1), confidence_colours()), legend)
 
 

@@ -150,7 +150,7 @@ class Panels:
         self.costs_box = Column(
             self.costs, words("cost-legend", COST_LEGEND), sizing_mode="stretch_width", visible=False
         )
-        self.patches = patch_chart("patches", sources.patches, {"patch": gray_mapper()}, 38, 57)
+        self.patches = patch_chart("patches", sources.patches, {"patch": gray_mapper()}, 42, 57)
         self.seen_scale = scales()["disparity"]
         self.seen = patch_chart("seen", sources.gray, {"gray": gray_mapper()}, 210, 112)
         self.seen.image(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from semidense.cache import CacheError, Store
 from semidense.pipeline.figures.colours import disparity_span, error_classes
-from semidense.pipeline.pages.html import confidence_legend, disparity_legend, error_legend, tag, text
+from semidense.pipeline.pages.html import confidence_legend, disparity_legend, error_legend, missing, tag, text
 from semidense.pipeline.pages.scene_maps import SceneMaps
 from semidense.pipeline.pages.viewer.catalogue import CatalogueScene, Configuration, catalogue
 from semidense.pipeline.pages.viewer.models import ERROR, FIGURES, SWIPED, Controls, Panels, Sources, connect
@@ -176,20 +176,17 @@ class Session:
         titles = {
             "left": ("left image", "the reference view"),
             "truth": ("ground truth (px)", disparity_legend(span, "unknown")),
-            "raw": ("raw disparity (px)", disparity_legend(span, "none")),
-            "confidence": ("confidence", confidence_legend()),
+            "raw": ("raw disparity (px)", disparity_legend(span, missing(maps.disparity))),
+            "confidence": ("confidence", confidence_legend(missing(maps.confidence))),
             "kept": ("kept at R (px)", disparity_legend(span, "not kept")),
             "error": ("error of what is kept", error_legend(none="not kept")),
         }
         for name, (title, legend) in titles.items():
             self.panels.maps[name].title.text = tag("h3", text(title))
             self.panels.maps[name].legend.text = legend
-        legends = {
-            "disparity": disparity_legend(span, "none"),
-            "error": error_legend(),
-            "confidence": confidence_legend(),
-        }
-        self.panels.swiped.legend.text = "<br>".join(f"{text(name)}: {legend}" for name, legend in legends.items())
+        scales = (disparity_legend(span, "none"), error_legend(), confidence_legend())
+        told = zip(("disparity", "error", "confidence"), scales, strict=True)
+        self.panels.swiped.legend.text = "<br>".join(f"{name}: {legend}" for name, legend in told)
         height, width = maps.size
         every = f"; every {maps.step}. row and column shown" if maps.step > 1 else ""
         mask = f"; mask nonocc: {maps.mask_kind}" if maps.mask_kind else ""

@@ -42,7 +42,7 @@ def test_configurations_are_named_by_what_differs(made: Handmade) -> None:
     judge(made, np.zeros((60, 90), np.float32), 7)
     (scene,) = catalogue(made.store)
     names = [each.name.split(" - ")[0] for each in scene.configurations]
-    assert names == ["paper, confidence.variant=7", "paper, confidence.variant=0"]
+    assert names == ["paper, exact, confidence.variant=7", "paper, exact, confidence.variant=0"]
     assert len({each.name for each in scene.configurations}) == 2
 
 
