@@ -203,6 +203,10 @@ class Draft(ABC):
 class Backend(Protocol):
     """The place of a cache. Every method raises ``CacheUnavailable`` if the place refuses."""
 
+    @property
+    def far(self) -> bool:
+        """Whether an answer takes so long to come that several are asked for at a time."""
+
     def create(self) -> None:
         """Make the cache if it is not there; refuse a place that holds somebody else's files."""
 

@@ -27,6 +27,11 @@ class FolderBackend:
 
     layout: Layout
 
+    @property
+    def far(self) -> bool:
+        """Reading takes longer than waiting for it, see ``Backend``."""
+        return False
+
     def create(self) -> None:
         """Make the cache's folders, see ``Backend``."""
         self.layout.create()

@@ -34,6 +34,11 @@ class ObjectBackend:
         """The requests to the store; a copy of this in another process makes its own connections."""
         return connect(self.url)
 
+    @property
+    def far(self) -> bool:
+        """Waiting for an answer takes longer than reading it, see ``Backend``."""
+        return True
+
     def create(self) -> None:
         """Mark the prefix as a cache, see ``Backend``; refuse a store without conditional writes."""
         if not self.objects.is_cache:

@@ -1,5 +1,6 @@
 import multiprocessing
 import pickle
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -48,6 +49,17 @@ def test_what_was_published_is_found(store: Store, make: Callable[..., Entry], r
     )
     assert (store.root / "CACHEDIR.TAG").read_text().startswith("Signature: 8a477f597d28d172789f06886806bc55")
     assert store.layout.record(recipe.key) == store.root / "records" / recipe.key[:2] / f"{recipe.key}.json"
+
+
+@pytest.mark.parametrize("far", [False, True])
+def test_only_in_a_far_place_several_entries_are_looked_at_at_a_time(
+    store: Store, far: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    threads = set()
+    monkeypatch.setattr(type(store.backend), "far", far)
+    monkeypatch.setattr(Store, "look", lambda _, key: (threads.add(threading.get_ident()), key)[1])
+    assert store.look_all(["b", "a", "c"]) == ["b", "a", "c"]
+    assert (threading.get_ident() in threads) is not far
 
 
 def test_a_look_finds_what_is_damaged_and_says_so(store: Store, make: Callable[..., Entry], recipe: Recipe) -> None:
