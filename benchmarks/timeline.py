@@ -68,11 +68,11 @@ def _seconds(results: Sequence[Any]) -> dict[str, tuple[int, float]]:
 def _draw(results: Sequence[Any], resources: Sequence[Any], dataset: str, path: Path) -> None:
     start = min(each.start_time for each in results)
     figure = new_figure(f"{dataset}: which worker did what and when")
-    figure.set_size_inches(8, 5.6)
-    axes = figure.subplots(3, 1, sharex=True, height_ratios=(2, 1, 1))
+    figure.set_size_inches(8, 6.6)
+    axes = figure.subplots(3, 1, sharex=True, height_ratios=(2, 1.5, 1.5))
     _draw_tasks(axes[0], results, start)
     times = [each.time - start for each in resources]
-    _draw_load(axes[1], times, [each.cpu for each in resources], "processor (%)")
+    _draw_load(axes[1], times, [each.cpu for each in resources], "load (%)")
     _draw_load(axes[2], times, [each.mem for each in resources], "memory (MB)")
     axes[2].set(xlabel="time (s)")
     legend_below(figure, axes[0].get_legend_handles_labels()[0])
