@@ -142,7 +142,7 @@ def summed_loss(net: DescriptorNet, crop: WideCrop, precision: Precision = "floa
     Of each pixel with a truth, ``-log`` of the probability that a softmax of the sums gives to the disparities within
     each of ``WINDOWS``, weighed; the mean over these pixels. At the very edge of a window a disparity counts half.
     """
-    known = torch.isfinite(crop.truth)
+    known = torch.isfinite(crop.truth) & ~crop.outside.all(1)
     sums = path_sums(crop_costs(net, crop, precision), crop.gray, AggregatedParams())
     probability = functional.softmax(-sums.masked_fill(crop.outside, torch.inf)[known] / TEMPERATURE, dim=1)
     distance = (torch.arange(sums.shape[2]) - crop.truth[known][:, None]).abs()
@@ -164,5 +164,5 @@ def crop_costs(net: DescriptorNet, crop: WideCrop, precision: Precision) -> Tens
     costs = net.log_odds(diagonals(left @ strip.mT, crop.outside.shape[1])).flip(2)
     inside = (~crop.outside).float()
     mean = (costs * inside).sum(2, keepdim=True) / inside.sum(1).clamp(min=1)[:, None]
-    least = costs.masked_fill(crop.outside, torch.inf).amin(2, keepdim=True)
-    return (torch.where(crop.outside, mean, costs) - least).clamp(max=CAP)
+    filled = torch.where(crop.outside, mean, costs)  # the mean is never the least; without any cell all are 0
+    return (filled - filled.amin(2, keepdim=True)).clamp(max=CAP)

@@ -38,8 +38,11 @@ def settings(**changes: object) -> DescriptorNetParams:
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_a_crop_as_large_as_the_image_has_the_sums_of_its_map(mirrored: bool) -> None:
+@pytest.mark.parametrize("least", [-2, 4])
+def test_a_crop_as_large_as_the_image_has_the_costs_of_its_map(mirrored: bool, least: int) -> None:
+    """With a range above 0 the first columns have no cell at all."""
     scene, net = shifted_scene(height=30, width=70), random_descriptor_net()
+    scene["truth"]["range"] = np.array([least, 13], np.int32)
     given = inputs(scene)
     given["matching_samples"]["mirrored"][:] = mirrored
     params = settings(summed_height=30, summed_width=70)
@@ -93,6 +96,21 @@ def test_a_crop_without_a_known_truth_teaches_nothing() -> None:
     value = summed_loss(net, nothing)
     assert float(value) == 0
     assert all(not each.any() for each in torch.autograd.grad(value, list(net.parameters())))
+
+
+def test_pixels_without_any_cell_teach_nothing_and_spoil_nothing() -> None:
+    """A truth of 5 px, where only 20 px and more are searched: the first 20 columns have no cell."""
+    given = inputs(shifted_scene(height=30, width=64))
+    given["truth"][0]["range"] = np.array([20, 30], np.int32)
+    params = settings(summed_height=30, summed_width=64)
+    crop = cut_wide_crop(
+        params, given["matching_samples"], channels(given), wide_scenes(given), np.random.default_rng(0)
+    )
+    assert crop.outside[:20].all() and torch.isfinite(crop.truth[:, 10:20]).any()
+    net = random_descriptor_net().requires_grad_(True)
+    value = summed_loss(net, crop)
+    assert torch.isfinite(value)
+    assert all(each.isfinite().all() for each in torch.autograd.grad(value, list(net.parameters())))
 
 
 def test_the_further_steps_begin_where_a_training_without_them_ends() -> None:
