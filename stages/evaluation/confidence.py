@@ -1,8 +1,12 @@
 """The confidence of each pixel of a raw map: the evaluation-Net at every pixel, the map's agreement, and the veto."""
 
+from typing import Literal
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn import functional
 
 from semidense.stages.compute.precision import Precision, autocast
 from semidense.stages.compute.threads import one_thread
@@ -36,17 +40,34 @@ def confidence(
 
 @one_thread()
 def padded_log_odds(
-    net: EvaluationNet, layers: NDArray[np.float32], precision: Precision = "float32", flipped: bool = False
+    net: EvaluationNet,
+    layers: NDArray[np.float32],
+    precision: Precision = "float32",
+    flipped: bool = False,
+    step: Literal[1, 2, 4] = 1,
 ) -> NDArray[np.float32]:
-    """Return the log-odds of ``confidence``, of layers (layer, y + 100, x + 100) with 50 px of context all round."""
+    """Return the log-odds of ``confidence``, of layers (layer, y + 100, x + 100) with 50 px of context all round.
+
+    With a ``step`` the net answers at every second or fourth pixel only, from the first row and column on, and the
+    pixels between are interpolated.
+    """
     with torch.inference_mode(), autocast(precision):
         maps = torch.from_numpy(np.ascontiguousarray(layers)).unsqueeze(0)
-        log_odds = net.dense(maps.contiguous(memory_format=torch.channels_last))
+        log_odds = net.dense(maps.contiguous(memory_format=torch.channels_last), step)
         if flipped:
             other = net.dense(maps.flip(2).contiguous(memory_format=torch.channels_last))
             log_odds = (log_odds + other.flip(0)) / 2
-    result: NDArray[np.float32] = log_odds.numpy()
+        height, width = (length - 2 * RADIUS for length in layers.shape[1:])
+        result: NDArray[np.float32] = _between(log_odds, step)[:height, :width].numpy()
     return result
+
+
+def _between(answers: Tensor, step: int) -> Tensor:
+    """Return answers that are ``step`` px apart, and those between, linear in y and in x."""
+    if step == 1:
+        return answers
+    size = [(length - 1) * step + 1 for length in answers.shape]
+    return functional.interpolate(answers[None, None], size=size, mode="bilinear", align_corners=True)[0, 0]
 
 
 def sigmoid(log_odds: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -16,11 +16,12 @@ their top left corners, and the answer at a corner depends on 94 x 94 pixels.
 A pooled network on a larger map answers at every 16th pixel (``forward``, used in training). ``dense``
 answers at every pixel by pooling at all four offsets, which splits a map into four *fragments*, each a
 quarter of the size; after four poolings 256 fragments interleave to the whole map. The convolutions
-stay plain, and none is computed twice.
+stay plain, and none is computed twice. Where the first poolings are left plain, it answers at every second or
+fourth pixel, for a quarter or a sixteenth of the work.
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -64,28 +65,31 @@ class EvaluationNet(nn.Module):
             (B, 2, (H - 94) // 16 + 1, (W - 94) // 16 + 1): of a patch only its first 94 rows and columns
             need to lie on the map.
         """
-        gray, disparity = (self._early(half, _plain_pool) for half in _halves(layers))
+        gray, disparity = (self._early(half, (_plain_pool, _plain_pool)) for half in _halves(layers))
         return self._late(gray, disparity, _plain_pool)
 
-    def dense(self, layers: Tensor) -> Tensor:
-        """Return the log-odds that the disparity is right, for every patch of one pair of maps.
+    def dense(self, layers: Tensor, step: Literal[1, 2, 4] = 1) -> Tensor:
+        """Return the log-odds that the disparity is right, for the patches of one pair of maps.
 
         Args:
             layers: (1, 2, H, W), as for ``forward``.
+            step: pixels from one patch to the next.
 
         Returns:
-            (H - 100, W - 100) float32, at the patches' top left corners.
+            float32 (y, x), at the patches' top left corners: every ``step``-th of the H - 100 by W - 100 patches that
+            lie on the maps, and the next one where these do not end with one, so that all lie between answers.
         """
-        gray, disparity = (torch.split(self._early(half, fragments), AT_ONCE) for half in _halves(layers))
+        pools = {1: (fragments, fragments), 2: (_plain_pool, fragments), 4: (_plain_pool, _plain_pool)}[step]
+        gray, disparity = (torch.split(self._early(half, pools), AT_ONCE) for half in _halves(layers))
         # From here on no fragment meets another: a few at a time bound the memory.
         parts = [self._late(*pair, fragments).float() for pair in zip(gray, disparity, strict=True)]
         logits = torch.cat([part.reshape(STRIDE, -1, *part.shape[1:]) for part in parts], 1).flatten(0, 1)
-        height, width = (length - PATCH + 1 for length in layers.shape[2:])
+        height, width = (-(-(length - PATCH) // step) + 1 for length in layers.shape[2:])
         return interleave(logits[:, 1] - logits[:, 0])[:height, :width]
 
-    def _early(self, maps: Tensor, pool: Pool) -> Tensor:
-        """Return the first two convolutions of one layer: (B, 1, H, W) -> (B or 16 B, 32, ...)."""
-        for conv in (self.conv1, self.conv2):
+    def _early(self, maps: Tensor, pools: tuple[Pool, Pool]) -> Tensor:
+        """Return the first two convolutions of one layer: (B, 1, H, W) -> (B, 4 B or 16 B, 32, ...)."""
+        for conv, pool in zip((self.conv1, self.conv2), pools, strict=True):
             maps = pool(conv(maps))
         return maps
 
@@ -145,10 +149,12 @@ def _pool(maps: NDArray[Any], made: NDArray[Any]) -> None:
 
 
 def interleave(values: Tensor) -> Tensor:
-    """Undo four rounds of ``fragments``: (256, H, W) -> (16 H, 16 W).
+    """Undo rounds of ``fragments``: (4 ** n, H, W) -> (2 ** n H, 2 ** n W).
 
-    The offsets of the last pooling come first in the batch and weigh most: 8, 4, 2, 1 pixels.
+    The offsets of the last pooling come first in the batch and weigh most.
     """
-    height, width = values.shape[1:]
-    offsets = values.reshape(2, 2, 2, 2, 2, 2, 2, 2, height, width)  # y8 x8 y4 x4 y2 x2 y1 x1 H W
-    return offsets.permute(8, 0, 2, 4, 6, 9, 1, 3, 5, 7).reshape(STRIDE * height, STRIDE * width)
+    while len(values) > 1:
+        count, height, width = values.shape
+        offsets = values.reshape(2, 2, count // 4, height, width).permute(2, 3, 0, 4, 1)
+        values = offsets.reshape(count // 4, 2 * height, 2 * width)
+    return values[0]

@@ -1,3 +1,5 @@
+from typing import Literal
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -61,6 +63,19 @@ def test_bfloat16_is_close_to_float32() -> None:
     assert rough.dtype == np.float32
     assert 0 < np.abs(rough - exact).max() <= 0.05
     assert np.abs(rough - exact).mean() <= 0.01
+
+
+@pytest.mark.parametrize("step", [2, 4])
+def test_pixels_between_two_answers_are_interpolated(step: Literal[2, 4]) -> None:
+    net = random_net()
+    padded = np.pad(random_layers(6, 9), ((0, 0), (50, 50), (50, 50)), mode="edge")
+    every, few = padded_log_odds(net, padded), padded_log_odds(net, padded, step=step)
+    assert few.shape == (6, 9) and few.dtype == np.float32
+    assert np.abs(few[::step, ::step] - every[::step, ::step]).max() <= 1e-4
+    middle = step // 2
+    assert np.abs(few[middle, 0] - (few[0, 0] + few[step, 0]) / 2) <= 1e-5
+    assert np.abs(few[0, middle] - (few[0, 0] + few[0, step]) / 2) <= 1e-5
+    assert np.abs(few[0, step + 1] - every[0, step] - (few[0, 2 * step] - few[0, step]) / step) <= 1e-4
 
 
 def test_looking_upside_down_too_is_the_mean_of_the_log_odds() -> None:

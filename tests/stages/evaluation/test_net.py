@@ -1,3 +1,5 @@
+from typing import Literal
+
 import numpy as np
 import pytest
 import torch
@@ -64,6 +66,17 @@ def test_dense_gives_the_patch_at_every_pixel(height: int, width: int) -> None:
         made = net.dense(tensor(layers)).numpy()
     assert made.shape == (height - 100, width - 100) and made.dtype == np.float32
     assert np.abs(made[tuple(corners.T)] - literal_log_odds(net, layers, corners)).max() <= 1e-4
+
+
+@pytest.mark.parametrize("step", [2, 4])
+@pytest.mark.parametrize("size", [(101, 101), (102, 105), (103, 106), (104, 112), (121, 104)])
+def test_dense_answers_at_every_few_pixels(size: tuple[int, int], step: Literal[2, 4]) -> None:
+    net, layers = random_net(), random_layers(*size)
+    around = np.pad(layers, ((0, 0), (0, step), (0, step)), mode="wrap")
+    with torch.inference_mode():
+        few, every = net.dense(tensor(layers), step).numpy(), net.dense(tensor(around)).numpy()[::step, ::step]
+    assert few.shape == tuple(-(-(length - 101) // step) + 1 for length in size)
+    assert np.abs(few - every[: few.shape[0], : few.shape[1]]).max() <= 1e-4
 
 
 def test_dense_at_every_16th_pixel_is_the_pooled_network() -> None:

@@ -3,12 +3,15 @@ import pytest
 
 from semidense.stages.disparity.evidence import FEATURES
 from semidense.stages.evaluation.agreement import agreement
+from semidense.stages.evaluation.confidence import confidence
 from semidense.stages.evaluation.evidence.confidence import weigh
 from semidense.stages.evaluation.evidence.declaration import EVIDENCE_CONFIDENCE, EvidenceConfidenceParams
-from semidense.stages.evaluation.evidence.features import of_whole_map
+from semidense.stages.evaluation.evidence.features import STEP, of_whole_map
+from semidense.stages.evaluation.evidence.foreign.declaration import FOREIGN_CONFIDENCE
 from semidense.stages.evaluation.evidence.net import INPUTS, EvidenceNet
+from semidense.stages.evaluation.layers import evaluation_layers
 from semidense.stages.learning.parameters import initialise, to_vector
-from semidense.stages.stage import StageError
+from semidense.stages.stage import Stage, StageError
 from tests.stages.evaluation.reference import random_net, scene
 from tests.stages.tiling import tiled, whole
 
@@ -53,6 +56,9 @@ def test_the_features_are_what_they_are_called() -> None:
     assert np.allclose(opened[: len(FEATURES)], np.nan_to_num(evidence), rtol=1e-4)
     assert (opened[: len(FEATURES), 0, 0] == 0).all(), "nothing is known where there is no evidence"
     assert np.allclose(opened[len(FEATURES)], known.log_odds, atol=1e-4)
+    layers = evaluation_layers(given["images"]["left"], given["images"]["moments"][0], disparity)
+    everywhere = confidence(random_net(), layers)
+    assert np.allclose(known.log_odds[::4, ::4], np.log(everywhere / (1 - everywhere))[::4, ::4], atol=1e-3)
     for place, window in ((1, 25), (2, 9)):
         assert np.allclose(opened[len(FEATURES) + place], agreement(disparity, window), atol=1e-4)
     agrees = np.pad(np.nan_to_num(evidence[FEATURES.index("agrees")]), 4, mode="edge")
@@ -60,7 +66,7 @@ def test_the_features_are_what_they_are_called() -> None:
     assert np.allclose(opened[-1], shares, atol=1e-4)
 
 
-@pytest.mark.parametrize("rows", [pytest.param(4, id="parts"), pytest.param(10, id="nearly all")])
+@pytest.mark.parametrize("rows", [pytest.param(4, id="parts"), pytest.param(8, id="nearly all")])
 def test_tiles_equal_the_whole(rows: int) -> None:
     one, other = (
         make(EVIDENCE_CONFIDENCE, PARAMS, products(), DIMS, *more) for make, more in ((tiled, [rows]), (whole, []))
@@ -70,6 +76,11 @@ def test_tiles_equal_the_whole(rows: int) -> None:
         assert np.abs(one[name] - other[name]).max() <= 1e-5
         assert np.ptp(other[name]) > 0.01
     assert np.array_equal(one["agreement"], other["agreement"])
+
+
+@pytest.mark.parametrize("stage", [EVIDENCE_CONFIDENCE, FOREIGN_CONFIDENCE], ids=lambda stage: stage.product)
+def test_a_tile_begins_where_the_evaluation_net_answers(stage: Stage) -> None:
+    assert stage.tile_rows and stage.tile_rows % STEP == 0
 
 
 def test_the_stage_weighs_the_features_of_the_whole_map() -> None:
