@@ -17,6 +17,9 @@ from semidense.stages.stage import Network
 
 OFFSETS = range(-2, 4)
 """Cells of a pixel: whole disparities from 2 px below the one at or below its own to 3 px above it."""
+CONTEXT = 12
+"""Pixels around a block that costs are told of: as far as the largest window reaches that they are averaged over."""
+_CUT = RADIUS - CONTEXT
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,7 @@ class Described:
     """Both views of a block with 50 px of context all round, as descriptors: whatever its map, they are the same.
 
     Attributes:
-        left: (y + 84, x + 84, 64) float32 of unit length: the block without its outer 8 px.
+        left: (y + 24, x + 24, 64) float32 of unit length: the block with ``CONTEXT``.
         right: the same of the right view.
         scale: log-odds of a mismatch by which a dot product of 1 is lower than one of 0.
         bias: log-odds of a dot product of 0.
@@ -43,14 +46,13 @@ class Described:
 
         Returns:
             (cell, y + 100, x + 100) float32, a cell for each of ``OFFSETS``; NaN where there is no disparity, where the
-            right pixel is outside the image, and in the outer 8 px.
+            right pixel is outside the image, and beyond ``CONTEXT``.
         """
         made = np.full((len(OFFSETS), *disparity.shape), np.nan, np.float32)
-        inner = np.ascontiguousarray(disparity[REACH:-REACH, REACH:-REACH])
-        first = RADIUS - REACH
+        inner = np.ascontiguousarray(disparity[_CUT:-_CUT, _CUT:-_CUT])
         products = np.full((len(OFFSETS), *inner.shape), np.nan, np.float32)
-        _write_products(self.left, self.right, inner, OFFSETS[0], first, inner.shape[1] - first, products)
-        made[:, REACH:-REACH, REACH:-REACH] = np.float32(self.bias) - np.float32(self.scale) * products
+        _write_products(self.left, self.right, inner, OFFSETS[0], CONTEXT, inner.shape[1] - CONTEXT, products)
+        made[:, _CUT:-_CUT, _CUT:-_CUT] = np.float32(self.bias) - np.float32(self.scale) * products
         return made
 
 
@@ -69,7 +71,8 @@ def described(channels: NDArray[np.float32], descriptor_net: Network, precision:
     net = descriptor_net_from_parameters(descriptor_net["parameters"], channels.shape[1])
     with torch.inference_mode():
         kernels = kernels_of(net, dtype_of(precision))
-        views = torch.from_numpy(np.ascontiguousarray(channels))
+        beyond = _CUT - REACH  # the net takes what a descriptor sees
+        views = torch.from_numpy(np.ascontiguousarray(channels[..., beyond:-beyond, beyond:-beyond]))
         left, right = (transformed_descriptors(net, kernels, view).numpy() for view in views)
         return Described(left, right, float(net.log_scale.exp()), float(net.bias))
 

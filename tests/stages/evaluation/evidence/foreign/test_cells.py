@@ -1,7 +1,8 @@
 import numpy as np
 
 from semidense.stages.evaluation.declaration import RADIUS
-from semidense.stages.evaluation.evidence.foreign.cells import OFFSETS, described
+from semidense.stages.evaluation.evidence.foreign.cells import CONTEXT, OFFSETS, described
+from semidense.stages.evaluation.evidence.foreign.features import MEANS
 from semidense.stages.matching.descriptors.net import descriptor_net_from_parameters
 from semidense.stages.matching.descriptors.volume import fast_cost_volume
 from tests.stages.evaluation.evidence.foreign.products import products
@@ -24,3 +25,7 @@ def test_the_cells_are_those_of_the_fast_volume() -> None:
             cells = [int(np.floor(disparity[y, x])) + offset + 20 for offset in OFFSETS]
             np.testing.assert_allclose(costs[:, y, x], volume[y, x, cells], atol=1e-3)
     assert np.isfinite(costs).mean() > 0.5
+
+
+def test_costs_are_told_as_far_as_they_are_averaged() -> None:
+    assert max(MEANS) // 2 <= CONTEXT
