@@ -20,6 +20,7 @@ from semidense.datasets import SceneSource, Truth, open_dataset, read_pfm
 from semidense.pipeline.plan.images_and_truth import read_images
 from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
 from semidense.stages.catalog import STAGES
+from semidense.stages.compute.precision import resolve
 from semidense.stages.evaluation.declaration import RADIUS
 from semidense.stages.evaluation.evidence.foreign.confidence import compute_foreign_confidence
 from semidense.stages.evaluation.evidence.foreign.declaration import MATCHERS, ForeignConfidenceParams
@@ -113,7 +114,8 @@ def _filtered(truth: Truth, found: Matched, *scores: Mapping[str, NDArray[np.flo
 
 
 def _score(block: Mapping[str, Any], right: bool) -> Mapping[str, NDArray[np.float32]]:
-    return {**compute_foreign_confidence(ForeignConfidenceParams(right=right, precision="bfloat16"), block)}  # type: ignore[arg-type]
+    params = ForeignConfidenceParams(right=right, precision=resolve("auto"))
+    return {**compute_foreign_confidence(params, block)}  # type: ignore[arg-type]
 
 
 def _block(images: Mapping[str, Array], disparity: Array, views: Array, nets: Mapping[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 from torch import nn
 
-from semidense.stages.evaluation.evidence.foreign.features import FEATURES
+from semidense.stages.evaluation.evidence.foreign.declaration import FEATURES
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.parameters import count, from_vector, to_vector

@@ -10,7 +10,7 @@ from safetensors import safe_open
 from safetensors.torch import load, save
 
 from semidense.stages import weights
-from semidense.stages.evaluation.evidence.foreign.features import FEATURES
+from semidense.stages.evaluation.evidence.foreign.declaration import FEATURES
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.parameters import count, to_vector

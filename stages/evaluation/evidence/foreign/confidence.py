@@ -6,8 +6,8 @@ from semidense.stages.evaluation.confidence import sigmoid
 from semidense.stages.evaluation.declaration import RADIUS, Confidence
 from semidense.stages.evaluation.evidence.confidence import weigh
 from semidense.stages.evaluation.evidence.foreign.cells import described
-from semidense.stages.evaluation.evidence.foreign.declaration import Foreign, ForeignConfidenceParams
-from semidense.stages.evaluation.evidence.foreign.features import OF_MAP, features, unscaled
+from semidense.stages.evaluation.evidence.foreign.declaration import OF_MAP, Foreign, ForeignConfidenceParams
+from semidense.stages.evaluation.evidence.foreign.features import features, unscaled
 
 
 def compute_foreign_confidence(params: ForeignConfidenceParams, inputs: Foreign) -> Confidence:

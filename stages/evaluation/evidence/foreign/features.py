@@ -10,62 +10,13 @@ from semidense.stages.evaluation.agreement import padded_agreement
 from semidense.stages.evaluation.declaration import RADIUS
 from semidense.stages.evaluation.evidence.features import network_log_odds
 from semidense.stages.evaluation.evidence.foreign.cells import OFFSETS
+from semidense.stages.evaluation.evidence.foreign.declaration import AGREEMENTS, MEANS, OF_CELLS
 from semidense.stages.evaluation.evidence.foreign.likeness import distinctiveness, support
 from semidense.stages.evaluation.evidence.foreign.overlap import overlap
 from semidense.stages.evaluation.evidence.foreign.windows import window_mean
 from semidense.stages.stage import Images, Network
 from semidense.stages.transforms.gray import to_gray
 
-AGREEMENTS = (5, 9, 25)
-"""Sides of the windows in which neighbours that agree are counted, px."""
-MEANS = (9, 25)
-"""Sides of the windows over which what is known of single pixels is averaged, px."""
-OF_MAP = (
-    "network",
-    *(f"agreement {side}" for side in AGREEMENTS),
-    *(f"known {side}" for side in MEANS),
-    "step",
-    *(f"step {side}" for side in MEANS),
-    "overlap",
-    *(f"overlap {side}" for side in MEANS),
-    "column",
-    "edge",
-    "support",
-    "distinctiveness",
-    "distinctiveness 9",
-)
-"""What the map and the left view tell, the first on the feature axis.
-
-- ``network``: log-odds of the evaluation-Net.
-- ``agreement``: share of a window within 1 px of the pixel's own disparity; ``known``: share that has a disparity.
-- ``step``: largest difference to one of the four neighbours, at most 10 px, and its means.
-- ``overlap``: see ``overlap``; and the share of a window that overlaps by more than 1 px.
-- ``column``: distance of the right pixel from the left border of the right view, at most 50 px.
-- ``edge``: distance to the next step of more than 1 px or hole, at most 50 px.
-- ``support``: share of the neighbours of like colour that agree; see ``support``.
-- ``distinctiveness``: see ``distinctiveness``; and its mean. How much texture there is, as such, is not told: on scenes
-  that a net had not seen it made the order of the pixels worse.
-"""
-OF_CELLS = (
-    "cost",
-    *(f"cost {side}" for side in MEANS),
-    "excess",
-    *(f"excess {side}" for side in MEANS),
-    "beside",
-    "rival",
-    "rival 9",
-    "judged",
-)
-"""What our costs at the map's disparities tell, the last on the feature axis; 0 without a right view.
-
-- ``cost``: log-odds of a mismatch at the disparity, between the two cells beside it; and its means.
-- ``excess``: by how much that lies above the least of the cells from 2 px below to 3 px above; and its means.
-- ``beside``: how much more the cells 2 px away cost.
-- ``rival``: by how much the cost lies above that of another pixel of the map that leads to the same right pixel.
-- ``judged``: 1 with a right view, else 0.
-"""
-FEATURES = (*OF_MAP, *OF_CELLS)
-"""The order of the feature axis."""
 LARGEST_STEP = 10.0
 """Steps beyond it are told alike, px."""
 

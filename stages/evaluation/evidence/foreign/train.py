@@ -5,8 +5,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from semidense.stages.evaluation.evidence.foreign.declaration import ForeignNetParams, OfForeignSamples
-from semidense.stages.evaluation.evidence.foreign.features import OF_CELLS
+from semidense.stages.evaluation.evidence.foreign.declaration import OF_CELLS, ForeignNetParams, OfForeignSamples
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.learning.parameters import initialise, to_vector
 from semidense.stages.learning.schedule import SHARDS

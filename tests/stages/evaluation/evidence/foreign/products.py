@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from semidense.stages.evaluation.evidence.foreign.features import FEATURES
+from semidense.stages.evaluation.evidence.foreign.declaration import FEATURES
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.learning.parameters import initialise, to_vector
 from tests.stages.evaluation.reference import random_net, scene

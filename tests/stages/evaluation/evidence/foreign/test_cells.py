@@ -2,7 +2,7 @@ import numpy as np
 
 from semidense.stages.evaluation.declaration import RADIUS
 from semidense.stages.evaluation.evidence.foreign.cells import CONTEXT, OFFSETS, described
-from semidense.stages.evaluation.evidence.foreign.features import MEANS
+from semidense.stages.evaluation.evidence.foreign.declaration import MEANS
 from semidense.stages.matching.descriptors.net import descriptor_net_from_parameters
 from semidense.stages.matching.descriptors.volume import fast_cost_volume
 from tests.stages.evaluation.evidence.foreign.products import products

@@ -2,7 +2,8 @@ import numpy as np
 
 from semidense.stages.evaluation.agreement import agreement
 from semidense.stages.evaluation.declaration import RADIUS
-from semidense.stages.evaluation.evidence.foreign.features import FEATURES, OF_CELLS, features, unscaled
+from semidense.stages.evaluation.evidence.foreign.declaration import FEATURES, OF_CELLS
+from semidense.stages.evaluation.evidence.foreign.features import features, unscaled
 from semidense.stages.evaluation.evidence.foreign.overlap import overlap
 from tests.stages.evaluation.evidence.foreign.products import products
 

@@ -3,13 +3,14 @@ import pytest
 
 from semidense.stages.evaluation.evidence.confidence import weigh
 from semidense.stages.evaluation.evidence.foreign.declaration import (
+    FEATURES,
     FOREIGN_NET,
     FOREIGN_SAMPLES,
     KINDS,
+    OF_CELLS,
     ForeignNetParams,
     ForeignSamplesParams,
 )
-from semidense.stages.evaluation.evidence.foreign.features import FEATURES, OF_CELLS
 from semidense.stages.evaluation.evidence.foreign.kinds import kinds_of
 from semidense.stages.evaluation.evidence.foreign.samples import draw_foreign_samples
 from semidense.stages.evaluation.evidence.foreign.train import train_foreign_net
