@@ -56,6 +56,7 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 
     shown = FIGURES[figure]
     unit = "" if shown.unit == "1" else f" ({shown.unit})"
     axes.set(xlabel=fill(shown.meaning + unit, int(_LETTERS * width)), xlim=(0, None))
+    axes.locator_params(axis="x", nbins=5)
     axes.grid(axis="x", alpha=0.3)
     handles, labels = axes.get_legend_handles_labels()
     drawn.legend(*_first_of_each(handles, labels), loc="outside lower center", ncols=3, frameon=False)
