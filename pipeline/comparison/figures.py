@@ -94,7 +94,7 @@ def density_figure(means: Sequence[Row]) -> Figure:
     axes.set_ylabel(f"bad: reported {mask} pixels off by more than {threshold:g} px (%)")
     axes.margins(x=0.12)
     axes.set_ylim(bottom=0)
-    axes.set_xlim(left=0)
+    axes.set_xlim(left=-1)
     axes.grid(alpha=0.3)
     axes.legend(loc="upper right", frameon=False)
     return drawn

@@ -119,3 +119,14 @@ def test_a_command_that_fails_is_named(tmp_path: Path, capsys: pytest.CaptureFix
     lines = ["pipeline presets", "pipeline view", "pipeline cache ls --cache new"]
     assert run_all(lines, tmp_path) == ["pipeline presets"]
     assert "not run  pipeline view" in capsys.readouterr().out
+
+
+def test_each_picture_of_the_documents_is_made_by_a_command() -> None:
+    from benchmarks import cost_volume, timeline
+    from tests.system.pictures import PICTURES
+
+    folder = ROOT / "docs" / "pictures"
+    assert {file.name for file in folder.iterdir()} == {
+        *PICTURES,
+        *(each.PICTURE.name for each in (cost_volume, timeline)),
+    }

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from semidense.pipeline.comparison.rows import Row
-from semidense.pipeline.pages.html import Html, folded, table, tag, text
+from semidense.pipeline.pages.html import Html, folded, table, tag
 from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, mean_name, mean_rows, with_means
 
 _COLUMNS = ("pixels", "raw_bad", "bad", "invalid", "avgerr", "rms")
