@@ -9,7 +9,7 @@ ifeq ($(filter exact guided,$(MODE)),)
 $(error MODE=$(MODE): the weights that come with the package are of exact and of guided volumes)
 endif
 
-.PHONY: demo test names lint docs commands train descriptors evaluation evidence foreign calibration train-general bench faults silence wheel clean
+.PHONY: demo test names lint docs commands pictures train descriptors evaluation evidence foreign calibration train-general bench faults silence wheel clean
 
 demo: $(READY)  ## run the pipeline on the bundled Motorcycle pair
 	$(BIN)/pipeline run motorcycle --output demo
@@ -32,6 +32,9 @@ docs: names  ## build the documentation site into build/site; a link that leads 
 
 commands: $(READY)  ## run every command that the documents show and that needs no data of the reader
 	$(BIN)/python -m tests.system.commands
+
+pictures: $(READY)  ## DATA=DIR (optional): make the pictures of the documents again; with DATA also that of other matchers
+	$(BIN)/python -m tests.system.pictures $(if $(DATA),middlebury:$(DATA)/MiddEval3/trainingQ)
 
 train: $(READY)  ## DATA=DIR: train both networks on DIR/2001, 2003, 2005 and 2006, and put the weights in place
 	@test -n "$(DATA)" || { echo "make train: say where the Middlebury sets are: make train DATA=DIR"; exit 2; }

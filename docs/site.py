@@ -17,6 +17,8 @@ from semidense.stages.catalog import STAGES
 from semidense.stages.stage import NoParams, Stage
 
 ROOT = Path(__file__).parents[1]
+_ORDERED = dict(sorted(STAGES.items(), key=lambda each: ".baselines." in each[1].compute))
+"""The stages as a run comes to them, then the other matchers and measures."""
 _BOUNDS = (("ge", "at least"), ("gt", "above"), ("le", "at most"), ("lt", "below"), ("min_length", "values, at least"))
 """Limits of a field, and how they are written."""
 ROOT_PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
@@ -66,7 +68,7 @@ def _group(command: click.Command, name: str) -> Iterator[str]:
 def settings() -> str:
     """Return the page of the settings: a table a section, with default, range and meaning."""
     lines = ["# Settings", "", "Give them as `--set section.field=value`, or in a TOML file with `--config`."]
-    for name, stage in STAGES.items():
+    for name, stage in _ORDERED.items():
         if stage.params is not NoParams:
             rows = [_setting(*each) for each in stage.params.model_fields.items()]
             about = (stage.params.__doc__ or "").split("\n")[0]
@@ -91,7 +93,7 @@ def products() -> str:
     """Return the page of the products: what each is made from, and its arrays."""
     about = "`--upto NAME` stops at a product; `Result.open(NAME)` and `pipeline inspect NAME` show one."
     lines = ["# Products", "", about]
-    for name, stage in STAGES.items():
+    for name, stage in _ORDERED.items():
         lines += [
             "",
             f"## {name}",

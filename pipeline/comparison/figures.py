@@ -56,6 +56,7 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 
     shown = FIGURES[figure]
     unit = "" if shown.unit == "1" else f" ({shown.unit})"
     axes.set(xlabel=fill(shown.meaning + unit, int(_LETTERS * width)), xlim=(0, None))
+    axes.locator_params(axis="x", nbins=5)
     axes.grid(axis="x", alpha=0.3)
     handles, labels = axes.get_legend_handles_labels()
     drawn.legend(*_first_of_each(handles, labels), loc="outside lower center", ncols=3, frameon=False)
@@ -93,7 +94,7 @@ def density_figure(means: Sequence[Row]) -> Figure:
     axes.set_ylabel(f"bad: reported {mask} pixels off by more than {threshold:g} px (%)")
     axes.margins(x=0.12)
     axes.set_ylim(bottom=0)
-    axes.set_xlim(left=0)
+    axes.set_xlim(left=-1)
     axes.grid(alpha=0.3)
     axes.legend(loc="upper right", frameon=False)
     return drawn

@@ -19,7 +19,7 @@ MATCHERS = {
 LOWERED = "MC-CNN accurate, 0.5 px subtracted"
 """MC-CNN's accurate weights give disparities about 0.5 px too high, which decides many errors above 1 px."""
 MEASURES = {
-    "evaluation-Net and agreement": ("confidence", "confidence"),
+    "this confidence": ("confidence", "confidence"),
     "evaluation-Net": ("confidence", "network"),
     "agreement": ("confidence", "agreement"),
     "APKR": ("cost_confidence", "apkr"),
@@ -29,7 +29,7 @@ MEASURES = {
     "PKRN": ("cost_confidence", "pkrn"),
     "cost": ("cost_confidence", "msm"),
 }
-"""Confidence measures of the raw map, by name: product and array."""
+"""Confidence measures of the raw map, by name: product and array. The first is that of the configuration."""
 
 
 def ours(products: Mapping[str, Arrays]) -> dict[str, NDArray[np.float32]]:

@@ -17,6 +17,8 @@ TITLES = {
     "auc": "Confidence of the raw map: area under the error curve; lower is better",
 }
 _DENSITY = ("invalid", "bad", "bad_dual_cnn", "avgerr", "rms", "A50", "A90", "A95", "A99")
+_SPARE = tuple(FIGURES[name].head for name in ("A50", "A90", "A95", "avgerr", "A99", "rms"))
+"""Columns of semi-dense maps that a narrow terminal does without, the least important first."""
 
 
 def quoted(found: Comparison) -> list[Row]:
@@ -51,7 +53,7 @@ def print_comparison(found: Comparison, masks: Iterable[str], threshold: float =
             print_table(table, console)
             console.print()
     if of(rows, "density"):
-        print_table(_density_table(of(means, "density")), console)
+        print_table(_density_table(of(means, "density")), console, _SPARE)
         console.print()
     _print_quoted(console, quoted(found))
     kinds = ", ".join(sorted(set(masks)))
@@ -64,25 +66,28 @@ def print_comparison(found: Comparison, masks: Iterable[str], threshold: float =
 
 
 def _by_scene(rows: Sequence[Row], means: Sequence[Row], experiment: str, figure: str) -> Table:
-    """Return a table of scenes and methods; the more numerous of the two are the rows."""
+    """Return a table of scenes and methods; the more numerous of the two are the rows.
+
+    Where the scenes are columns, the mean is the first: a narrow terminal shows it before it breaks the table in parts.
+    """
     methods = {row["method"]: (row["method"], figure) for row in means}
     if experiment == "auc":
         methods["optimal"] = (means[0]["method"], "auc_optimal")
     cells = {(row["scene"], row["method"]): row for row in rows} | {("mean", row["method"]): row for row in means}
-    scenes = [*dict.fromkeys(row["scene"] for row in rows), "mean"]
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
     shown = {
         (scene, name): _cell(cells.get((scene, method), {}), value)
-        for scene in scenes
+        for scene in (*scenes, "mean")
         for name, (method, value) in methods.items()
     }
-    if len(methods) < len(scenes):
+    if len(methods) <= len(scenes):
         table = _table(TITLES[experiment], "scene", *methods)
-        for scene in scenes:
+        for scene in (*scenes, "mean"):
             table.add_row(escape(scene), *(shown[scene, name] for name in methods))
     else:
-        table = _table(TITLES[experiment], "method", *scenes)
+        table = _table(TITLES[experiment], "method", "mean", *scenes)
         for name in methods:
-            table.add_row(escape(name), *(shown[scene, name] for scene in scenes))
+            table.add_row(escape(name), *(shown[scene, name] for scene in ("mean", *scenes)))
     return table
 
 
@@ -111,7 +116,7 @@ def _print_quoted(console: Console, quoted: Sequence[Row]) -> None:
 
 
 def _table(title: str, *columns: str) -> Table:
-    table = Table(*(escape(column) for column in columns), title=title, title_justify="left", box=None, pad_edge=False)
+    table = Table(*(escape(column) for column in columns), title=title, box=None, pad_edge=False)
     for column in table.columns[1:]:
         column.justify = "right"
     return table

@@ -19,6 +19,8 @@ _MARKED = 5
 """Values of R that are written beside a curve, at most."""
 _DOTS = 25
 """Points of a curve that are drawn as dots, at most: more make a band."""
+_WIDTH, _HEIGHT, _LINE = 6.2, 5.4, 0.19
+"""Width of the figure, its height without the legend, and the height of a line of the legend, inches."""
 _COLUMNS = 64
 """Characters in a line of the legend."""
 _DASHES = ("-", "--", ":", "-.")
@@ -60,7 +62,6 @@ def error_curve_figure(
     if not drawn:
         raise UsageError(f"no row has an R, the mask {mask} and the threshold {threshold:g} px: nothing to draw")
     figure = new_figure(title)
-    figure.set_size_inches(6.2, 5.6)
     axes = figure.subplots()
     styles = cycle([(colour, dash) for dash in _DASHES for colour in LINES])
     for name, curve in drawn.items():
@@ -70,7 +71,7 @@ def error_curve_figure(
     _draw_means(axes, chosen, marked)
     draw_matchers(axes, [{**row, "method": f"{row['method']} (other matcher)"} for row in others])
     _label(axes, mask, threshold)
-    _legend(figure, axes)
+    figure.set_size_inches(_WIDTH, _HEIGHT + _LINE * _legend(figure, axes))
     return figure
 
 
@@ -156,10 +157,11 @@ def _label(axes: Axes, mask: str, threshold: float) -> None:
     axes.grid(alpha=0.3)
 
 
-def _legend(figure: Figure, axes: Axes) -> None:
-    """Put the legend below the axes, in as many columns as fit; scenes' names are taken literally."""
+def _legend(figure: Figure, axes: Axes) -> int:
+    """Put the legend below the axes, and return its lines. It has as many columns as fit; names are taken literally."""
     handles, labels = axes.get_legend_handles_labels()
     columns = max(1, min(4, _COLUMNS // (max(map(len, labels)) + 6)))
     place: dict[str, Any] = {"loc": "outside lower center", "ncols": columns, "frameon": False, "fontsize": "small"}
     for text in figure.legend(handles, labels, **place).get_texts():
         text.set_parse_math(False)
+    return -(-len(labels) // columns)

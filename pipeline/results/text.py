@@ -60,11 +60,13 @@ def print_table(table: Table, console: Console, spare: Sequence[str] = ()) -> No
     No number is cut: columns that are aligned right, or that must not wrap, keep their width. Other texts are folded.
 
     Args:
-        table: with texts as cells.
+        table: with texts as cells. Its title is printed once, above the first part.
         console: to print on.
         spare: heads of the columns that may be left out, the least important first. They are named below the table.
     """
     out: list[str] = []
+    if table.title:
+        console.print(table.title, style="italic", markup=False)
     if not _fits(table, console):
         table = _with_broken_heads(table, console)
     for head in (each for each in spare if each in _heads(table)):
@@ -129,7 +131,7 @@ def _with_broken_heads(table: Table, console: Console) -> Table:
 def _only(table: Table, heads: Sequence[str]) -> Table:
     """Return a table of some of the columns, named by their heads in one line."""
     kept = [column for column, head in zip(table.columns, _heads(table), strict=True) if head in heads]
-    narrower = Table(box=None, pad_edge=table.pad_edge, title=table.title, title_justify=table.title_justify)
+    narrower = Table(box=None, pad_edge=table.pad_edge)
     for column in kept:
         narrower.add_column(column.header, justify=column.justify, no_wrap=_is_whole(column), overflow="fold")
     for cells in zip(*(column.cells for column in kept), strict=True):

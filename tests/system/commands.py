@@ -27,7 +27,7 @@ NOT_RUN = (
     (r"\bKEY\b", "needs the key of an entry"),
     (r"my_costs", "needs a stage of another package: tests/system/test_extension.py has one"),
     (r"--calib |camera/|shots/|video/|pairs\.csv|rectified/", "needs files of the reader: tests/system/test_match.py"),
-    (r"\.pfm|volume\.npy", "needs the result of another matcher: tests/system/test_score.py, test_own_costs.py"),
+    (r"\.pfm|volume\.(npy|zarr)", "needs the result of another matcher: tests/system/test_score.py, test_own_costs.py"),
     (r"a\.toml|matching_net\.safetensors", "needs a file that the reader writes"),
     (r"pipeline compare", "slow: tests/system/test_compare.py compares on a small scene"),
     (r"channels\.rank_window", "slow: makes an exact volume for each new setting"),

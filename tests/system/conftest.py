@@ -38,17 +38,24 @@ class Seen:
         return bool(self.page.evaluate("document.documentElement.scrollWidth <= innerWidth"))
 
 
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    """Headless Chromium; tests skip where there is none."""
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """Run headless Chromium; tests skip where there is none."""
     driver = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install -e .[dev]")
     program = next((path for path in map(shutil.which, _NAMES) if path), None)
     if program is None:
         pytest.skip("there is no Chromium on this machine: apt-get install chromium")
     with driver.sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield chromium
-        chromium.close()
+        started = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """Headless Chromium, for all tests."""
+    with chromium() as started:
+        yield started
 
 
 @pytest.fixture(scope="module")

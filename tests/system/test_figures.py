@@ -1,4 +1,4 @@
-"""Every table of measured figures in the documents names the command that makes it, and Python examples import."""
+"""Measured figures in the documents, in tables and in running text, name their command; Python examples import."""
 
 import ast
 import importlib
@@ -20,6 +20,12 @@ NAMED = re.compile(
     re.MULTILINE,
 )
 """A command, or the remark that there is no command."""
+
+
+TOLD = re.compile(r"\d+\.\d+ (%|points)|\b0\.0\d{3}\b|\b\d+\.\d+ (s|[GM]B)\b")
+"""A measured figure in running text: a number with a decimal point and a unit, or an area under the error curve."""
+LINK = re.compile(r"\]\([^)]+\)")
+"""A link: to the section that has the figure, and its command."""
 
 
 def sections(text: str) -> Iterator[tuple[str, str]]:
@@ -46,9 +52,25 @@ def unnamed(text: str) -> list[str]:
     ]
 
 
+def untold(text: str) -> list[str]:
+    """Return the paragraphs that quote figures in sections that name no command and lead to none."""
+    return [
+        f"{heading}: {paragraph}"
+        for heading, body in sections(text)
+        if not NAMED.search(body) and not LINK.search(body)
+        for paragraph in re.sub(r"```.*?```|`[^`]*`", "", TABLE.sub("", body), flags=re.DOTALL).split("\n\n")
+        if TOLD.search(paragraph)
+    ]
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda each: each.name)
 def test_a_table_of_figures_names_its_command(document: Path) -> None:
     assert unnamed(document.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda each: each.name)
+def test_a_section_that_tells_figures_names_a_command(document: Path) -> None:
+    assert untold(document.read_text(encoding="utf-8")) == []
 
 
 HEAD = "## Speed\n\n| | seconds |\n|---|---|\n| ours | 1.5 |\n| theirs | 2.5 |\n"
@@ -66,6 +88,22 @@ HEAD = "## Speed\n\n| | seconds |\n|---|---|\n| ours | 1.5 |\n| theirs | 2.5 |\n
 )
 def test_a_table_without_a_command_is_found(beside: str, found: bool) -> None:
     assert bool(unnamed(HEAD + beside)) is found
+
+
+@pytest.mark.parametrize(
+    ("told", "found"),
+    [
+        pytest.param("Of these 1.4 % are wrong.", True, id="a share"),
+        pytest.param("The AUC is 0.0428.", True, id="an area"),
+        pytest.param("It takes 2.5 s.", True, id="a time"),
+        pytest.param("`pipeline run motorcycle` prints 1.4 %.", False, id="a command"),
+        pytest.param("Of these 1.4 % are wrong ([table](accuracy.md)).", False, id="a link to the table"),
+        pytest.param("A trial without a command: 1.4 % are wrong.", False, id="a trial"),
+        pytest.param("`--density 1.4 %`, from version 0.1 on, keeps 80 % of the 3 x 3 px.", False, id="no measurement"),
+    ],
+)
+def test_a_figure_in_running_text_without_a_command_is_found(told: str, found: bool) -> None:
+    assert bool(untold(f"## Speed\n\nFirst.\n\n{told}\n")) is found
 
 
 def test_figures_are_found_in_the_documents() -> None:

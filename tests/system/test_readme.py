@@ -1,5 +1,6 @@
 """Every command, setting, target and file that the README and the other documents name is there."""
 
+import importlib.util
 import re
 import shlex
 from itertools import pairwise
@@ -31,7 +32,11 @@ OPTIONS = sorted(
     {line for line in re.findall(r"`([a-z]+ [^`]*--[^`]+)`", " ".join(TEXT.split())) if line.split()[0] in NAMES}
 )
 """Commands in running text, named without ``pipeline``, with an option."""
-TARGETS = {line.split()[1] for line in LINES if line.startswith("make ")}
+TARGETS = {
+    *(line.split()[1] for line in LINES if line.startswith("make ")),
+    *re.findall(r"`make ([\w-]+)", " ".join(TEXT.split())),
+}
+MODULES = sorted(set(re.findall(r"python -m ((?:benchmarks|tests|semidense)[\w.]*)", " ".join(TEXT.split()))))
 
 
 def parse(line: str) -> None:
@@ -99,6 +104,11 @@ def test_a_target_of_the_readme_is_in_the_makefile(target: str) -> None:
     assert re.search(rf"^{re.escape(target)}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
 
 
+@pytest.mark.parametrize("module", MODULES)
+def test_a_module_that_the_documents_run_is_there(module: str) -> None:
+    assert importlib.util.find_spec(module.replace("benchmarks.NAME", "benchmarks"))
+
+
 def test_the_modules_that_the_documents_name_are_there() -> None:
     rooms = [ROOT, *(ROOT / package for package in ("pipeline", "stages", "datasets", "cache"))]
     ours = [name for name in re.findall(r"`([\w/]+/\w+\.py)`", TEXT) if not name.startswith("stereo_extras/")]
@@ -119,3 +129,22 @@ def test_a_command_that_fails_is_named(tmp_path: Path, capsys: pytest.CaptureFix
     lines = ["pipeline presets", "pipeline view", "pipeline cache ls --cache new"]
     assert run_all(lines, tmp_path) == ["pipeline presets"]
     assert "not run  pipeline view" in capsys.readouterr().out
+
+
+def test_each_picture_of_the_documents_is_made_by_a_command() -> None:
+    from benchmarks import cost_volume, timeline
+    from tests.system.pictures import PICTURES
+
+    folder = ROOT / "docs" / "pictures"
+    assert {file.name for file in folder.iterdir()} == {
+        *PICTURES,
+        *(each.PICTURE.name for each in (cost_volume, timeline)),
+    }
+
+
+def test_a_command_that_is_run_needs_no_file_that_is_not_there() -> None:
+    """The folder holds ``left.png`` and ``right.png``; other files must come from an earlier command."""
+    from tests.system.commands import reason
+
+    ran = [line.split(" #")[0] for line in COMMANDS if reason(line) is None]
+    assert [line for line in ran if re.search(r"(costs|disparity)=\S*\.\w+", line)] == []

@@ -1,5 +1,6 @@
 """The report in a real browser: light, dark, narrow, printed, and without a mouse."""
 
+import io
 import re
 import time
 from collections.abc import Callable
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from semidense.pipeline.api import Task, run, sweep
 from semidense.pipeline.pages.report import report
@@ -97,6 +99,7 @@ def test_a_scene_is_printed_on_three_pages_without_controls(look: Callable[..., 
     for hidden in (".zoom", "nav", "#how-it-was-made", "summary"):
         assert not page.locator(hidden).first.is_visible()
     assert page.locator(".gallery").first.is_visible()
+    assert page.evaluate("getComputedStyle(document.querySelector('.scroll')).breakInside") == "avoid", "with caption"
 
 
 def test_results_come_before_what_made_them(look: Callable[..., Seen], address: str) -> None:
@@ -121,6 +124,20 @@ def test_charts_fit_a_narrow_screen(look: Callable[..., Seen], address: str) -> 
     page: Any = look(address, NARROW).page
     ends = "[...document.querySelectorAll('.chart svg')].map((chart) => chart.getBoundingClientRect().right)"
     assert max(each for each in page.evaluate(ends)) <= NARROW[0]
+
+
+def test_a_table_that_goes_on_shows_an_edge(look: Callable[..., Seen], address: str) -> None:
+    page: Any = look(address, NARROW).page
+    tables = {
+        each.evaluate("(box) => box.scrollWidth > box.clientWidth + 1"): each
+        for each in page.locator(".scroll").all()
+        if each.is_visible()
+    }
+    picture = np.asarray(Image.open(io.BytesIO(tables[True].screenshot())).convert("L"))
+    assert picture[picture.shape[0] // 2, -2] < 128, "a line where columns are hidden"
+    if False in tables:
+        whole = np.asarray(Image.open(io.BytesIO(tables[False].screenshot())).convert("L"))
+        assert (whole[:, -1] > 230).all()
 
 
 def test_the_curve_is_the_sweep_s(look: Callable[..., Seen], address: str, own_task: Task) -> None:

@@ -225,6 +225,7 @@ def test_a_click_and_then_another_scene_draws_it_whole(look: Look, small: Runnin
 
 def test_a_clicked_pixel_is_in_sight(seen: Seen) -> None:
     seen.page.evaluate("scrollTo(0, 0)")
+    close = seen.page.get_by_role("button", name="close")
     click(seen, "raw", 20, 40)
     seen.page.wait_for_function(f"{model('pixel')}.text.includes('y = ')")
     seen.page.wait_for_timeout(500)
@@ -232,8 +233,9 @@ def test_a_clicked_pixel_is_in_sight(seen: Seen) -> None:
         "(({top, bottom}) => [top, bottom])(document.querySelector('.place').getBoundingClientRect())"
     )
     assert WIDE[1] / 4 < top < bottom <= WIDE[1]
-    seen.page.get_by_role("button", name="close").click()
+    close.click()
     seen.page.wait_for_function(f"{model('pixel')}.text.startsWith('Click')")
+    close.wait_for(state="hidden")
 
 
 def test_maps_can_be_made_larger(seen: Seen) -> None:

@@ -4,11 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from semidense.pipeline.comparison.rows import Row
-from semidense.pipeline.pages.html import Html, folded, table, tag, text
+from semidense.pipeline.pages.html import Html, folded, table, tag
 from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, mean_name, mean_rows, with_means
 
 _COLUMNS = ("pixels", "raw_bad", "bad", "invalid", "avgerr", "rms")
-_NONE_CACHED = "No other matcher is cached for these scenes. Run `pipeline compare` to add some to this table."
 
 
 def metrics_tables(rows: Sequence[Row], kept: str) -> Html:
@@ -92,7 +91,8 @@ def matchers_table(compared: Sequence[Row]) -> Html:
     """Return a table of the other cached matchers, with the error of dual-cnn at the density of each."""
     rows = _density_rows(compared)
     if not rows:
-        return tag("p", text(_NONE_CACHED), class_="quiet")
+        told = ("No other matcher is cached for these scenes. ", tag("code", "pipeline compare"), " adds some.")
+        return tag("p", *told, class_="quiet")
     figures = ("invalid", "bad", "bad_dual_cnn")
     head = ["method", "scene", *(FIGURES[name].head for name in figures)]
     means, every = (

@@ -7,7 +7,6 @@ from typing import Any
 
 from semidense.cache import Entry, Store
 from semidense.pipeline.api import Task, open_store, status
-from semidense.pipeline.comparison.methods import MEASURES
 from semidense.pipeline.files.suggestion import run_command
 from semidense.pipeline.pages.report.baselines import cached_baselines, compared_rows
 from semidense.pipeline.pages.scene_maps import SceneMaps
@@ -18,10 +17,6 @@ from semidense.pipeline.results.metric_rows import MASK, METHOD, THRESHOLD
 from semidense.pipeline.results.provenance import lineage
 from semidense.stages.evaluation.filtering import SemidenseParams
 from semidense.stages.metrics.stage import metric_rows
-
-OURS = "this confidence"
-"""The name of the configuration's own confidence beside other measures: a preset may make it in another way."""
-_CONFIDENCE = next(iter(MEASURES))
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,9 +100,8 @@ class Gathered:
 
     @property
     def compared(self) -> list[dict[str, Any]]:
-        """The rows of the comparison of all scenes; the confidence of the configuration has the name ``OURS``."""
-        rows = [row for scene in self.scenes for row in scene.compared]
-        return [row | {"method": OURS} if row["method"] == _CONFIDENCE else row for row in rows]
+        """The rows of the comparison of all scenes."""
+        return [row for scene in self.scenes for row in scene.compared]
 
 
 def gather(task: Task) -> Gathered:

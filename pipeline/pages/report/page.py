@@ -84,12 +84,11 @@ def _cards(found: Gathered) -> Html:
     if not rows:
         return ""
     mean = averaged(rows)[0]
+    over = f"Means of {len(rows)} of {len(found.scenes)} scenes; the others have no figures in the cache."
+    over = over if len(rows) < len(found.scenes) else f"Means of {len(rows)} scenes." if len(rows) > 1 else ""
     cards = [(value, about) for name, value, about in _figures(mean, filter_text(found.filtering)) if name in mean]
-    return tag(
-        "div",
-        *(tag("div", tag("b", text(value)), tag("span", text(about)), class_="card") for value, about in cards),
-        class_="cards",
-    )
+    shown = [tag("div", tag("b", text(value)), tag("span", text(about)), class_="card") for value, about in cards]
+    return tag("div", *shown, class_="cards") + (tag("p", text(over), class_="quiet") if over else "")
 
 
 def _figures(mean: Mapping[str, Any], kept: str) -> list[tuple[str, str, str]]:

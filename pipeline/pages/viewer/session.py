@@ -233,6 +233,7 @@ class Session:
         self.controls.x.update(value=None, high=width - 1)
         self._filling = False
         self.panels.frame.mark.data = {"x": [], "y": []}
+        self.controls.close.visible = False
         clear_pixel(self.panels)
 
     def show_pixel(self) -> None:
@@ -254,6 +255,7 @@ class Session:
 
     def _show_pixel(self, keys: dict[str, str], y: int, x: int) -> None:
         self.panels.frame.mark.data = {"x": [x], "y": [y]}
+        self.controls.close.visible = True
         arrays = self._open(keys)
         values = {
             name: float(arrays[name][column][y, x])

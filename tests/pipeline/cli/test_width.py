@@ -34,6 +34,19 @@ def test_metrics(trained: Result, terminal: io.StringIO) -> None:
             assert all(f"{row[name]:.2f}" in shown for name in ("bad", "invalid") if name in row)
 
 
+def test_a_sweep(trained: Result, terminal: io.StringIO) -> None:
+    variants = ("semidense.R=0.5, costvolume.mode=fast", "semidense.R=0.9, costvolume.mode=guided")
+    rows = [row | {"variant": each} for each in variants for row in trained.metrics]
+    printing.print_sweep(rows, trained.mask_kinds())
+    shown = terminal.getvalue()
+    assert "…" not in shown
+    assert max(map(len, shown.splitlines())) <= printing.results().width
+    assert all(mode in "".join(shown.split()) for mode in ("mode=fast", "mode=guided"))
+    for row in trained.metrics:
+        if row["mask"] == "nonocc" and row["threshold_px"] == 1:
+            assert all(f" {row[name]:.2f} " in shown for name in ("bad", "invalid") if name in row)
+
+
 def test_cache_ls(trained: Result, terminal: io.StringIO) -> None:
     listing.list_entries(trained.store.root, listing.Selection(), False)
     shown = terminal.getvalue()

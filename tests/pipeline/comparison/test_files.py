@@ -9,8 +9,8 @@ from rich.console import Console
 
 from semidense.pipeline.comparison.ablation import ABLATION
 from semidense.pipeline.comparison.methods import LOWERED, MATCHERS
-from semidense.pipeline.comparison.tables import _by_scene
-from semidense.pipeline.results.metric_rows import METHOD
+from semidense.pipeline.comparison.tables import _DENSITY, _SPARE, _by_scene, _density_table
+from semidense.pipeline.results.metric_rows import FIGURES, METHOD
 from semidense.pipeline.results.text import print_table
 
 SCENES = ("Motorcycle", "MotorcycleE", "Piano", "PianoL", "Pipes", "Playroom", "Shelves", "Teddy")
@@ -32,7 +32,7 @@ def figures(lines: Sequence[str]) -> list[int]:
     return [count for count in counts if count]
 
 
-@pytest.mark.parametrize("width", [100, 240])
+@pytest.mark.parametrize("width", [60, 80, 100, 240])
 @pytest.mark.parametrize("methods", [FEW, METHODS], ids=["few methods", "all"])
 def test_nothing_is_cut(width: int, methods: Sequence[str]) -> None:
     lines = printed(width, methods)
@@ -40,6 +40,33 @@ def test_nothing_is_cut(width: int, methods: Sequence[str]) -> None:
     assert not any("…" in line for line in lines)
     words = " ".join(lines).split()
     assert all(word in words for name in (*methods, *SCENES, "mean") for word in name.split())
+
+
+def test_the_mean_is_in_the_first_part_of_a_table_in_parts() -> None:
+    lines = printed(60)
+    assert lines[1].split()[:2] == ["method", "mean"]
+    assert sum(line.startswith("method") for line in lines) > 1
+
+
+@pytest.mark.parametrize(
+    ("width", "left_out"),
+    [
+        pytest.param(60, ["A50 px", "A90 px", "A95 px", "avgerr px", "A99 px"], id="60"),
+        pytest.param(80, ["A50 px", "A90 px"], id="80"),
+        pytest.param(240, [], id="240"),
+    ],
+)
+def test_semi_dense_maps_lose_columns_by_priority(width: int, left_out: list[str]) -> None:
+    figures = {name: 10.25 + place for place, name in enumerate(_DENSITY)}
+    means = [{"scene": "mean of 8", "method": method, **figures} for method in MATCHERS]
+    console = Console(file=io.StringIO(), width=width)
+    print_table(_density_table(means), console, _SPARE)
+    shown = console.file.getvalue()  # type: ignore[attr-defined]
+    assert max(map(len, shown.splitlines())) <= width
+    kept = [f"{value:.2f}" for name, value in figures.items() if FIGURES[name].head not in left_out]
+    whole = [line.split()[-len(kept) :] for line in shown.splitlines() if "10.25" in line]
+    assert whole == [kept] * len(MATCHERS)
+    assert (f"left out at this width: {', '.join(left_out)}" in " ".join(shown.split())) == bool(left_out)
 
 
 def test_more_methods_than_scenes_go_down_and_fewer_across() -> None:

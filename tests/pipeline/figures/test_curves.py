@@ -92,3 +92,12 @@ def test_chosen_thresholds_are_written_and_another_matcher_is_named_as_one() -> 
 def test_nothing_to_draw_is_refused(rows: list[dict[str, Any]]) -> None:
     with pytest.raises(UsageError, match="mask nonocc and the threshold 1 px"):
         error_curve_figure(rows)
+
+
+@pytest.mark.parametrize("matchers", [0, 5, 20])
+def test_the_label_of_the_error_is_no_longer_than_its_axis(matchers: int) -> None:
+    others = [row("a", None, 20, 5, method=f"matcher {number}, mean of 8") for number in range(matchers)]
+    figure = error_curve_figure(ROWS, others=others)
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    assert axes.yaxis.label.get_window_extent().height <= axes.get_window_extent().height

@@ -86,6 +86,15 @@ def test_a_table_that_is_too_wide_is_printed_in_parts(width: int) -> None:
     parts = shown.getvalue().count("method")
     assert parts == shown.getvalue().count("SGM")
     assert (parts == 1) == (width == 240)
+    assert lines[0].strip() == "raw maps" and shown.getvalue().count("raw maps") == 1, "the title stands once"
+
+
+def test_a_title_is_as_wide_as_the_terminal_and_not_as_its_table() -> None:
+    table = Table("scene", "AUC", title="area under the error curve; lower is better [nonocc]", box=None)
+    table.add_row("Teddy", "0.0040")
+    shown = io.StringIO()
+    print_table(table, Console(file=shown, width=80))
+    assert shown.getvalue().splitlines()[0] == "area under the error curve; lower is better [nonocc]"
 
 
 def test_a_long_text_is_folded_and_not_cut() -> None:

@@ -44,11 +44,11 @@ def _publication_row(each: Publication, data: Path) -> dict[str, Any]:
 
 
 def _print_publications(rows: list[dict[str, Any]], data: Path) -> None:
-    table = Table("fetch", "here", "about", "licence", "cite", "page", box=None)
+    table = Table("fetch", "here", "size", "licence", "cite", "page", box=None)
     for column in table.columns:
         column.no_wrap = True
     for row in rows:
-        size = bytes_text(row["megabytes"] * 1_000_000) if row["megabytes"] else "?"
+        size = bytes_text(row["megabytes"] * 1_000_000) if row["megabytes"] else "unknown"
         mark = "" if row["confirmed"] else " *"
         table.add_row(row["name"] + mark, row["here"], size, row["licence"], row["cite"], row["page"])
     console = results()

@@ -29,4 +29,4 @@ const which = (n) => found.length > 1 ? `<span class="which">${names.data.name[n
 const share = () => (100 * shown.filter((d) => Number.isFinite(d)).length / shown.length).toFixed(1)
 told.text = fact("R", R.toFixed(2)) + (found.length
   ? found.map((each, n) => which(n) + figures(each)).join("")
-  : fact("kept", `${share()} % of all pixels`) + "no ground truth is cached")
+  : fact("kept", `${share()} % of all pixels`) + "not judged by a ground truth yet")

@@ -53,7 +53,7 @@ def test_one_scene_needs_no_mean() -> None:
 
 
 def test_without_matchers_the_page_says_what_makes_them() -> None:
-    assert "pipeline compare" in matchers_table(MEASURES)
+    assert "<code>pipeline compare</code>" in matchers_table(MEASURES)
 
 
 def test_a_measure_that_a_scene_lacks_has_no_mean() -> None:

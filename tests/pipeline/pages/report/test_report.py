@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,10 @@ from PIL import Image
 
 from semidense.pipeline.api import Task
 from semidense.pipeline.pages.report import report
+from semidense.pipeline.pages.report.page import _cards
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.result import Result
+from semidense.stages.evaluation.filtering import SemidenseParams
 from tests.tiny import SPEC, TEST_ONLY, TRAINED
 
 Invoke = Callable[..., Any]
@@ -49,6 +52,24 @@ def test_the_figures_are_those_of_the_run(page: str, trained: Result) -> None:
     (row,) = [each for each in trained.metrics if each["mask"] == "nonocc" and each["threshold_px"] == 1]
     for name, digits in (("raw_bad", 2), ("invalid", 2), ("auc", 4)):
         assert f'<td class="number">{row[name]:.{digits}f}</td>' in page
+
+
+@pytest.mark.parametrize(
+    ("figures", "scenes", "told"),
+    [
+        pytest.param(1, 1, "", id="one scene"),
+        pytest.param(3, 3, "Means of 3 scenes.", id="every scene"),
+        pytest.param(2, 3, "Means of 2 of 3 scenes; the others have no figures in the cache.", id="not every scene"),
+    ],
+)
+def test_the_first_figures_say_over_which_scenes_they_are_means(figures: int, scenes: int, told: str) -> None:
+    rows = [
+        {"scene": f"scene {place}", "mask": "nonocc", "threshold_px": 1.0, "pixels": 9, "raw_bad": 10.0 * place}
+        for place in range(figures)
+    ]
+    cards = _cards(SimpleNamespace(rows=rows, scenes=range(scenes), filtering=SemidenseParams()))  # type: ignore[arg-type]
+    assert re.findall(r'<p class="quiet">(.*?)</p>', cards) == [told] * bool(told)
+    assert f"<b>{5 * (figures - 1):.1f} %</b>" in cards
 
 
 def test_the_pictures_are_the_maps(page: str, trained: Result) -> None:

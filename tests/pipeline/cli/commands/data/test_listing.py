@@ -14,6 +14,9 @@ def test_every_dataset_is_listed(tmp_path: Path, capsys: pytest.CaptureFixture[s
     list_datasets(tmp_path, as_json=False)
     out = capsys.readouterr().out
     assert all(pattern in out for pattern, _ in describe())
+    fetched = {line.split()[0]: line.split()[2:4] for line in out.splitlines() if " no " in line}
+    assert fetched["kitti2015"] == ["1.6", "GB"]
+    assert fetched["eth3d"][0] == "unknown"
 
 
 def test_scenes_are_listed_with_what_is_known(capsys: pytest.CaptureFixture[str]) -> None:
