@@ -10,6 +10,7 @@ from semidense.stages.evaluation.declaration import Confidence
 from semidense.stages.evaluation.evidence.declaration import EvidenceConfidenceParams, WithEvidence
 from semidense.stages.evaluation.evidence.features import features
 from semidense.stages.evaluation.evidence.net import EvidenceNet
+from semidense.stages.evaluation.evidence.of_map import AGREEMENT, NETWORK, opened
 from semidense.stages.evaluation.silence.veto import vetoed
 from semidense.stages.learning.parameters import from_vector
 
@@ -32,9 +33,9 @@ def compute_evidence_confidence(params: EvidenceConfidenceParams, inputs: WithEv
         StageError: if the disparity map brings no evidence of its costs.
     """
     known = features(inputs["images"], inputs["disparity"], inputs["evaluation_net"], params.precision)
-    confidence = sigmoid(weigh(inputs["evidence_net"]["parameters"], known.stacked))
+    confidence = sigmoid(weigh(inputs["evidence_net"]["parameters"], known))
     return {
         "confidence": np.where(vetoed(inputs), np.float32(0), confidence) if params.veto else confidence,
-        "network": sigmoid(known.log_odds),
-        "agreement": known.agreement,
+        "network": sigmoid(opened(known[NETWORK])),
+        "agreement": opened(known[AGREEMENT]),
     }

@@ -4,10 +4,10 @@ import torch
 from torch import Tensor, nn
 
 from semidense.stages.disparity.evidence import FEATURES
-from semidense.stages.evaluation.evidence.declaration import WINDOWS
+from semidense.stages.evaluation.evidence.declaration import OF_MAP, OF_NEIGHBOURS
 
-INPUTS = len(FEATURES) + 1 + 2 * len(WINDOWS)
-"""What the costs say, the evaluation-Net's log-odds, and two counts of neighbours a window."""
+INPUTS = len(OF_MAP) + len(FEATURES) + len(OF_NEIGHBOURS)
+"""What a map by our own summed costs looks like, what the costs say of the pixel, and what they say around it."""
 HIDDEN = 32
 
 

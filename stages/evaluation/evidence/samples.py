@@ -21,7 +21,7 @@ def draw_evidence_samples(params: EvidenceSamplesParams, inputs: EvidentScene) -
         StageError: if the map brings no evidence of its costs.
     """
     disparity = inputs["disparity"]
-    stacked = of_whole_map(inputs["images"], disparity, inputs["evaluation_net"], params.precision).stacked
+    stacked = of_whole_map(inputs["images"], disparity, inputs["evaluation_net"], params.precision)
     error = np.abs(disparity["disparity"] - inputs["truth"]["disparity"]).ravel()
     judged = np.flatnonzero(np.isfinite(error))
     chosen = np.random.default_rng(params.seed).choice(judged, min(params.pixels, judged.size), replace=False)

@@ -6,8 +6,9 @@ from semidense.stages.evaluation.confidence import sigmoid
 from semidense.stages.evaluation.declaration import RADIUS, Confidence
 from semidense.stages.evaluation.evidence.confidence import weigh
 from semidense.stages.evaluation.evidence.foreign.cells import described
-from semidense.stages.evaluation.evidence.foreign.declaration import OF_MAP, Foreign, ForeignConfidenceParams
-from semidense.stages.evaluation.evidence.foreign.features import features, unscaled
+from semidense.stages.evaluation.evidence.foreign.declaration import Foreign, ForeignConfidenceParams
+from semidense.stages.evaluation.evidence.foreign.features import features
+from semidense.stages.evaluation.evidence.of_map import AGREEMENT, NETWORK, opened
 
 
 def compute_foreign_confidence(params: ForeignConfidenceParams, inputs: Foreign) -> Confidence:
@@ -22,6 +23,6 @@ def compute_foreign_confidence(params: ForeignConfidenceParams, inputs: Foreign)
     has_none = np.isnan(disparity[RADIUS:-RADIUS, RADIUS:-RADIUS])
     return {
         "confidence": np.where(has_none, np.float32(0), confidence),
-        "network": sigmoid(unscaled(known[OF_MAP.index("network")])),
-        "agreement": unscaled(known[OF_MAP.index("agreement 25")]),
+        "network": sigmoid(opened(known[NETWORK])),
+        "agreement": opened(known[AGREEMENT]),
     }

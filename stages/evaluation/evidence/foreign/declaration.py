@@ -9,6 +9,7 @@ from pydantic import Field
 
 from semidense.stages.compute.precision import Precision
 from semidense.stages.evaluation.declaration import RADIUS
+from semidense.stages.evaluation.evidence.declaration import MEANS, OF_MAP
 from semidense.stages.learning.schedule import SHARDS, Schedule
 from semidense.stages.stage import DisparityMap, Images, Network, Output, Params, Stage, Truth
 from semidense.stages.transforms.declaration import Channels
@@ -28,36 +29,6 @@ KINDS = (
 )
 """The kinds of maps that are learnt from."""
 
-AGREEMENTS = (5, 9, 25)
-"""Sides of the windows in which neighbours that agree are counted, px."""
-MEANS = (9, 25)
-"""Sides of the windows over which what is known of single pixels is averaged, px."""
-OF_MAP = (
-    "network",
-    *(f"agreement {side}" for side in AGREEMENTS),
-    *(f"known {side}" for side in MEANS),
-    "step",
-    *(f"step {side}" for side in MEANS),
-    "overlap",
-    *(f"overlap {side}" for side in MEANS),
-    "column",
-    "edge",
-    "support",
-    "distinctiveness",
-    "distinctiveness 9",
-)
-"""What the map and the left view tell, the first on the feature axis.
-
-- ``network``: log-odds of the evaluation-Net.
-- ``agreement``: share of a window within 1 px of the pixel's own disparity; ``known``: share that has a disparity.
-- ``step``: largest difference to one of the four neighbours, at most 10 px, and its means.
-- ``overlap``: see ``overlap.overlap``; and the share of a window that overlaps by more than 1 px.
-- ``column``: distance of the right pixel from the left border of the right view, at most 50 px.
-- ``edge``: distance to the next step of more than 1 px or hole, at most 50 px.
-- ``support``: share of the neighbours of like colour that agree; see ``likeness.support``.
-- ``distinctiveness``: see ``likeness.distinctiveness``; and its mean. How much texture there is, as such, is not told:
-  on scenes that a net had not seen it made the order of the pixels worse.
-"""
 OF_CELLS = (
     "cost",
     *(f"cost {side}" for side in MEANS),

@@ -5,10 +5,16 @@ from semidense.stages.disparity.evidence import FEATURES
 from semidense.stages.evaluation.agreement import agreement
 from semidense.stages.evaluation.confidence import confidence
 from semidense.stages.evaluation.evidence.confidence import weigh
-from semidense.stages.evaluation.evidence.declaration import EVIDENCE_CONFIDENCE, EvidenceConfidenceParams
-from semidense.stages.evaluation.evidence.features import STEP, of_whole_map
+from semidense.stages.evaluation.evidence.declaration import (
+    EVIDENCE_CONFIDENCE,
+    OF_MAP,
+    OF_NEIGHBOURS,
+    EvidenceConfidenceParams,
+)
+from semidense.stages.evaluation.evidence.features import of_whole_map
 from semidense.stages.evaluation.evidence.foreign.declaration import FOREIGN_CONFIDENCE
 from semidense.stages.evaluation.evidence.net import INPUTS, EvidenceNet
+from semidense.stages.evaluation.evidence.of_map import STEP, opened
 from semidense.stages.evaluation.layers import evaluation_layers
 from semidense.stages.learning.parameters import initialise, to_vector
 from semidense.stages.stage import Stage, StageError
@@ -50,20 +56,31 @@ def products(height: int = 11, width: int = 8) -> dict[str, dict[str, np.ndarray
 def test_the_features_are_what_they_are_called() -> None:
     given = products()
     known = of_whole_map(given["images"], given["disparity"], given["evaluation_net"], "float32")
-    assert known.stacked.shape == (INPUTS, 11, 8) and np.isfinite(known.stacked).all()
-    opened = np.sign(known.stacked) * np.expm1(np.abs(known.stacked))
+    assert known.shape == (INPUTS, 11, 8) and np.isfinite(known).all()
+    told = dict(zip((*OF_MAP, *FEATURES, *OF_NEIGHBOURS), opened(known), strict=True))
     evidence, disparity = given["disparity"]["evidence"].astype(np.float32), given["disparity"]["disparity"]
-    assert np.allclose(opened[: len(FEATURES)], np.nan_to_num(evidence), rtol=1e-4)
-    assert (opened[: len(FEATURES), 0, 0] == 0).all(), "nothing is known where there is no evidence"
-    assert np.allclose(opened[len(FEATURES)], known.log_odds, atol=1e-4)
-    layers = evaluation_layers(given["images"]["left"], given["images"]["moments"][0], disparity)
+    for name, values in zip(FEATURES, np.nan_to_num(evidence), strict=True):
+        assert np.allclose(told[name], values, rtol=1e-4), name
+        assert told[name][0, 0] == 0, "nothing is known where there is no evidence"
+    for window in (9, 25):
+        assert np.allclose(told[f"agreement {window}"], agreement(disparity, window), atol=1e-4)
+    beyond = np.pad(np.nan_to_num(evidence), ((0, 0), (4, 4), (4, 4)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(beyond, (9, 9), axis=(1, 2))
+    margin, difference, agrees = (
+        windows[FEATURES.index(name)] for name in ("aggregated_margin", "left_right", "agrees")
+    )
+    assert np.allclose(told["aggregated_margin 9"], margin.mean(axis=(2, 3)), rtol=1e-4)
+    assert np.allclose(told["left_right 9"], (difference > 1).mean(axis=(2, 3)), atol=1e-4)
+    assert np.allclose(told["agrees 9"], agrees.mean(axis=(2, 3)), atol=1e-4)
+
+
+def test_the_evaluation_net_answers_at_every_fourth_pixel() -> None:
+    given = products()
+    known = of_whole_map(given["images"], given["disparity"], given["evaluation_net"], "float32")
+    layers = evaluation_layers(given["images"]["left"], given["images"]["moments"][0], given["disparity"]["disparity"])
     everywhere = confidence(random_net(), layers)
-    assert np.allclose(known.log_odds[::4, ::4], np.log(everywhere / (1 - everywhere))[::4, ::4], atol=1e-3)
-    for place, window in ((1, 25), (2, 9)):
-        assert np.allclose(opened[len(FEATURES) + place], agreement(disparity, window), atol=1e-4)
-    agrees = np.pad(np.nan_to_num(evidence[FEATURES.index("agrees")]), 4, mode="edge")
-    shares = np.lib.stride_tricks.sliding_window_view(agrees, (9, 9)).mean(axis=(2, 3))
-    assert np.allclose(opened[-1], shares, atol=1e-4)
+    expected = np.log(everywhere / (1 - everywhere))[::4, ::4]
+    assert np.allclose(opened(known[OF_MAP.index("network")])[::4, ::4], expected, atol=1e-3)
 
 
 @pytest.mark.parametrize("rows", [pytest.param(4, id="parts"), pytest.param(8, id="nearly all")])
@@ -86,7 +103,7 @@ def test_a_tile_begins_where_the_evaluation_net_answers(stage: Stage) -> None:
 def test_the_stage_weighs_the_features_of_the_whole_map() -> None:
     given = products()
     known = of_whole_map(given["images"], given["disparity"], given["evaluation_net"], "float32")
-    odds = weigh(given["evidence_net"]["parameters"], known.stacked)
+    odds = weigh(given["evidence_net"]["parameters"], known)
     made = whole(EVIDENCE_CONFIDENCE, PARAMS, given, DIMS)
     assert list(made) == [output.name for output in EVIDENCE_CONFIDENCE.outputs]
     assert np.abs(made["confidence"] - 1 / (1 + np.exp(-odds))).max() <= 1e-5

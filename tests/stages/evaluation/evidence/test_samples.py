@@ -23,7 +23,7 @@ def test_all_pixels_of_known_truth_are_drawn_once_where_there_are_few() -> None:
     made = draw_evidence_samples(PARAMS.model_copy(update={"pixels": 10**6}), scene)
     error = np.abs(scene["disparity"]["disparity"] - scene["truth"]["disparity"])
     known = np.isfinite(error)
-    stacked = of_whole_map(scene["images"], scene["disparity"], scene["evaluation_net"], "float32").stacked
+    stacked = of_whole_map(scene["images"], scene["disparity"], scene["evaluation_net"], "float32")
     assert np.array_equal(np.sort(made["error"]), np.sort(error[known]))
     rows = {tuple(row) for row in np.column_stack([made["features"], made["error"]]).tolist()}
     assert rows == {tuple(row) for row in np.column_stack([stacked[:, known].T, error[known]]).tolist()}

@@ -43,7 +43,7 @@ def test_it_learns_which_evidence_tells_right_from_wrong() -> None:
     scene = evident_scenes()[0]
     known = of_whole_map(scene["images"], scene["disparity"], scene["evaluation_net"], "float32")
     right = scene["disparity"]["evidence"][FEATURES.index("aggregated_margin")] > 8
-    odds = weigh(made["parameters"], known.stacked)
+    odds = weigh(made["parameters"], known)
     assert np.mean((odds > 0) == right) > 0.95
 
 

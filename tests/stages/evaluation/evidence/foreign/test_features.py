@@ -3,8 +3,9 @@ import numpy as np
 from semidense.stages.evaluation.agreement import agreement
 from semidense.stages.evaluation.declaration import RADIUS
 from semidense.stages.evaluation.evidence.foreign.declaration import FEATURES, OF_CELLS
-from semidense.stages.evaluation.evidence.foreign.features import features, unscaled
-from semidense.stages.evaluation.evidence.foreign.overlap import overlap
+from semidense.stages.evaluation.evidence.foreign.features import features
+from semidense.stages.evaluation.evidence.of_map import opened
+from semidense.stages.evaluation.evidence.overlap import overlap
 from tests.stages.evaluation.evidence.foreign.products import products
 
 
@@ -15,7 +16,7 @@ def known(disparity: np.ndarray, costs: np.ndarray | None = None) -> dict[str, n
     padded = np.pad(disparity, RADIUS, mode="edge")
     found = features(images, padded, given["evaluation_net"], costs, "float32")
     assert found.dtype == np.float32 and np.isfinite(found).all()
-    return dict(zip(FEATURES, unscaled(found), strict=True))
+    return dict(zip(FEATURES, opened(found), strict=True))
 
 
 def test_the_map_tells_what_it_looks_like() -> None:

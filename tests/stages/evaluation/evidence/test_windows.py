@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from semidense.stages.evaluation.evidence.foreign.windows import window_mean
+from semidense.stages.evaluation.evidence.windows import window_mean
 
 
 @pytest.mark.parametrize("side", [1, 9, 101])

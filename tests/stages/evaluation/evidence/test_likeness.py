@@ -1,7 +1,7 @@
 import numpy as np
 
 from semidense.stages.evaluation.declaration import RADIUS
-from semidense.stages.evaluation.evidence.foreign.likeness import distinctiveness, support
+from semidense.stages.evaluation.evidence.likeness import distinctiveness, support
 
 
 def test_a_patch_is_compared_with_those_of_its_row() -> None:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from semidense.stages.evaluation.evidence.foreign.overlap import LARGEST, overlap
+from semidense.stages.evaluation.evidence.overlap import LARGEST, overlap
 from semidense.stages.stage import StageError
 
 N = np.nan
