@@ -21,7 +21,7 @@ from rich.console import Console
 from benchmarks.harness import timed, write
 from semidense.datasets import open_dataset
 from semidense.pipeline.api import Task, run, status
-from semidense.pipeline.execution.scheduler import _graph
+from semidense.pipeline.execution.graph import make_graph
 from semidense.pipeline.plan.plan import Plan
 
 MEASURED = ((96, 128, 16), (192, 256, 32))
@@ -112,7 +112,7 @@ def graph_of(size: Size, preset: str, rate: Mapping[Kind, tuple[float, float]]) 
     with tempfile.TemporaryDirectory() as folder:
         plan = status(Task(scene_of(size), cache=Path(folder), preset=preset))
     context: Any = None
-    graph, _ = _graph(plan, context)
+    graph, _ = make_graph(plan, context)
     amount, count = amounts(plan, size), Counter(map(kind_of, graph))
     seconds = {
         kind: (rate[kind][0] + rate[kind][1] * amount.get(kind[0], 0)) / tasks if kind in rate else 0.0

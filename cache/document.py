@@ -6,15 +6,17 @@ byte of the file is noticed, also one that JSON itself would forgive, such as wh
 
 import hashlib
 import json
+import threading
 from collections.abc import Callable, Mapping
 from math import isfinite
-from typing import Any, NoReturn, TypeAlias
+from typing import Any, Generic, NoReturn, TypeAlias, TypeVar
 
 from semidense.cache.errors import InvalidRecipe
 
 FORMAT_VERSION = 1
 """The version of keys, records and manifests; it enters every key."""
 
+D = TypeVar("D")
 Json: TypeAlias = dict[str, Any] | list[Any] | str | int | float | bool | None
 _AS_THEY_ARE = frozenset((str, int, bool, type(None)))
 _TEXT = {str}
@@ -131,6 +133,38 @@ def _refuse_constant(name: str) -> NoReturn:
 _DECODER = json.JSONDecoder(
     object_pairs_hook=_unique, parse_constant=_refuse_constant, parse_float=lambda text: _finite(float(text))
 )
+
+
+class Documents(Generic[D]):
+    """Documents by their bytes: a process parses the same bytes once, and never those that it wrote itself.
+
+    Args:
+        parse: makes a document from its bytes and what else it is given.
+        most: how many are kept; the one that was kept first goes first.
+    """
+
+    def __init__(self, parse: Callable[..., D], most: int = 2048) -> None:
+        self._parse, self._most = parse, most
+        self._kept: dict[tuple[object, ...], D] = {}
+        self._lock = threading.Lock()
+
+    def read(self, data: bytes, *others: object) -> D:
+        """Return the document of some bytes; raise what ``parse`` does."""
+        found = self._kept.get((data, *others))
+        return self.keep(self._parse(data, *others), data, *others) if found is None else found
+
+    def keep(self, document: D, data: bytes, *others: object) -> D:
+        """Keep a document with the bytes that it was written as, and return it."""
+        with self._lock:
+            self._kept[data, *others] = document
+            if len(self._kept) > self._most:
+                del self._kept[next(iter(self._kept))]
+        return document
+
+    def forget(self) -> None:
+        """Forget all of them."""
+        with self._lock:
+            self._kept.clear()
 
 
 def seal(kind: str, content: Mapping[str, Any]) -> bytes:

@@ -1,4 +1,8 @@
-"""Files that survive a crash, a kill and a full disk."""
+"""Files that survive a crash, a kill and a full disk.
+
+Much here is done for each of thousands of small files, where building paths would take longer than what is done with
+them: so it calls ``os``, and takes a path as text too.
+"""
 
 import errno
 import hashlib
@@ -11,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import TypeVar
 
@@ -20,6 +25,8 @@ T = TypeVar("T")
 R = TypeVar("R")
 THREADS = 4
 """Threads that read, hash and sync: enough to hide the disk's latency."""
+THREADS_PAY = 1 << 20
+"""Bytes from which on starting threads takes less time than they save."""
 _BLOCK = 1 << 18
 """Bytes of a file that are read and hashed at a time."""
 
@@ -91,9 +98,14 @@ def in_threads(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
     return [found[number] for number in range(len(items))]
 
 
+def shared_out(function: Callable[[T], R], items: Iterable[T], size: int) -> list[R]:
+    """Return ``function`` of each item, in order, worked out by a few threads if the items have many bytes together."""
+    return in_threads(function, items) if size >= THREADS_PAY else [function(item) for item in items]
+
+
 def is_folder(path: Path) -> bool:
     """Return whether the path is a folder; a link to a folder does not count."""
-    return path.is_dir() and not path.is_symlink()
+    return os.path.isdir(path) and not os.path.islink(path)
 
 
 def require_no_link(path: Path) -> None:
@@ -112,14 +124,27 @@ def make_folder(path: Path) -> None:
     Raises:
         OSError: if that is not possible, or a link stands in the folder's place.
     """
+    if is_folder(path):
+        return
     require_no_link(path)
-    missing = [folder for folder in (path, *path.parents) if not folder.is_dir()]
+    missing = [*takewhile(lambda folder: not folder.is_dir(), (path, *path.parents))]
     for folder in reversed(missing):
         folder.mkdir(exist_ok=True)
         sync(folder.parent)
 
 
-def sync(path: Path) -> None:
+def add_folder(path: Path) -> None:
+    """Make a folder inside one that is there, unless it is there; its name need not be on disk yet.
+
+    Raises:
+        OSError: if that is not possible, or a link stands in the folder's place.
+    """
+    if not is_folder(path):
+        require_no_link(path)
+        path.mkdir(exist_ok=True)
+
+
+def sync(path: str | Path) -> None:
     """Have the file, or the names in the folder, on disk before this returns."""
     handle = os.open(path, os.O_RDONLY)
     try:
@@ -128,39 +153,48 @@ def sync(path: Path) -> None:
         os.close(handle)
 
 
-def write_synced(path: Path, data: bytes) -> None:
-    """Write a new read-only file whose content is on disk before this returns."""
+def write_new(path: Path, data: bytes) -> None:
+    """Write a new read-only file; it need not be on disk yet."""
     with path.open("xb") as file:
         file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
     make_read_only(path)
 
 
-def write_whole(path: Path, data: bytes) -> None:
+def write_whole(path: str | Path, data: bytes) -> None:
     """Write a file, and its folders, so that whoever sees it sees all of it; it need not be on disk yet."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f"{path.name}.{secrets.token_hex(8)}.partial")
+    temporary = f"{path}.{secrets.token_hex(8)}.partial"
     try:
-        temporary.write_bytes(data)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+        try:
+            _write(temporary, data)
+        except FileNotFoundError:
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            _write(temporary, data)
+        os.replace(temporary, path)
+    except BaseException:
+        with suppress(FileNotFoundError):
+            os.unlink(temporary)
+        raise
+
+
+def _write(path: str, data: bytes) -> None:
+    with open(path, "wb") as file:
+        file.write(data)
 
 
 def hash_file(path: str | Path) -> str:
     """Return the sha256 of a file's bytes, in hexadecimal."""
     sha256 = hashlib.sha256()
-    # A Path, or a buffer, for each of thousands of small files would cost more than hashing them.
-    with open(path, "rb", buffering=0) as file:  # noqa: PTH123
+    with open(path, "rb", buffering=0) as file:  # a buffer would cost more than hashing a small file
         while block := file.read(_BLOCK):
             sha256.update(block)
     return sha256.hexdigest()
 
 
-def make_read_only(path: Path) -> None:
-    """Take away everybody's right to write."""
-    path.chmod(stat.S_IMODE(path.stat().st_mode) & ~0o222)
+def make_read_only(path: str | Path) -> int:
+    """Take away everybody's right to write; return the size."""
+    status = os.stat(path)
+    os.chmod(path, stat.S_IMODE(status.st_mode) & ~0o222)
+    return status.st_size
 
 
 @dataclass(frozen=True)

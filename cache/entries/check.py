@@ -5,19 +5,17 @@ import os
 import stat
 import time
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
+from semidense.cache.document import Documents
 from semidense.cache.entries.backend import Policy
 from semidense.cache.entries.entry import MANIFEST, Entry, File, Manifest
 from semidense.cache.errors import DamagedEntry, EntryNotFound
-from semidense.cache.files import hash_file, in_threads, reading, walk
+from semidense.cache.files import hash_file, reading, shared_out, walk
 from semidense.cache.layout import Layout
 
 SETTLED = 0.1
 """Seconds after which a file's times tell every later change; they advance in steps of up to 10 ms."""
-THREADS_PAY = 1 << 20
-"""Bytes from which on starting threads takes less time than they save."""
 
 _Print = tuple[int, int, int, int, int]
 _hashed: dict[str, tuple[_Print, str]] = {}
@@ -46,12 +44,12 @@ def read_record(layout: Layout, key: str) -> Entry:
             data = read_plain(path)
         except FileNotFoundError:
             raise EntryNotFound(f"no entry has the key {key} in {layout.root}") from None
-    return _entry(key, data)
+    return RECORDS.read(data, key)
 
 
-# A run reads the same documents several times; the same bytes need be parsed and compared but once.
-_entry = lru_cache(2048)(Entry.from_bytes)
-_manifest = lru_cache(2048)(Manifest.from_bytes)
+RECORDS = Documents(lambda data, key: Entry.from_bytes(key, data))
+MANIFESTS = Documents(Manifest.from_bytes)
+"""What this process read or wrote: a run needs the same documents several times."""
 
 
 def read_plain(path: str | Path) -> bytes:
@@ -103,7 +101,7 @@ def _read_manifest(folder: Path, entry: Entry) -> Manifest:
     """Return the manifest if it is the one that the record tells."""
     if not stat.S_ISDIR(folder.lstat().st_mode):
         raise DamagedEntry(f"{folder} is not a folder")
-    manifest = _manifest(read_plain(folder / MANIFEST))
+    manifest = MANIFESTS.read(read_plain(folder / MANIFEST))
     if (manifest.digest, manifest.size) != (entry.digest, entry.size):
         raise DamagedEntry(f"its manifest has digest {manifest.digest}, its record {entry.digest}")
     return manifest
@@ -144,8 +142,7 @@ def _compare_bytes(files: "list[tuple[File, os.DirEntry[str]]]", looked: float |
         return _hash(each[1], looked) != each[0].sha256
 
     unknown = [(file, thing) for file, thing in files if looked is None or _known(thing) != file.sha256]
-    small = sum(file.size for file, _ in unknown) < THREADS_PAY
-    wrongs = map(differs, unknown) if small else in_threads(differs, unknown)
+    wrongs = shared_out(differs, unknown, sum(file.size for file, _ in unknown))
     for (file, _), wrong in zip(unknown, wrongs, strict=True):
         if wrong:
             raise DamagedEntry(f"the bytes of {file.path} are not those that were written")
@@ -154,8 +151,8 @@ def _compare_bytes(files: "list[tuple[File, os.DirEntry[str]]]", looked: float |
 def forget() -> None:
     """Forget what this process knows of files: every byte is read, and every document parsed, again."""
     _hashed.clear()
-    _entry.cache_clear()
-    _manifest.cache_clear()
+    RECORDS.forget()
+    MANIFESTS.forget()
 
 
 def _hash(thing: "os.DirEntry[str]", looked: float | None) -> str | None:

@@ -1,6 +1,7 @@
 """Work in progress in a folder: one of its own into which arrays are written, and which is then published whole."""
 
 import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ from semidense.cache.entries.arrays import (
 from semidense.cache.entries.backend import Draft
 from semidense.cache.entries.entry import DATA, Entry
 from semidense.cache.errors import IncompleteDraft, InvalidArray
-from semidense.cache.files import in_threads, write_whole, writing
+from semidense.cache.files import shared_out, write_whole, writing
 from semidense.cache.layout import Layout
 from semidense.cache.processes.locks import Lock
 
@@ -37,6 +38,11 @@ def hold(lease: Lock) -> str:
     """Hold a lease for one draft alone, which is then to have its name; return the name."""
     _own[lease.path.name] = lease
     return lease.path.name
+
+
+def _content(path: str) -> bytes:
+    with open(path, "rb", buffering=0) as file:
+        return file.read()
 
 
 @dataclass(frozen=True)
@@ -65,8 +71,8 @@ class FolderDraft(Draft):
         kind = require_dtype(name, dtype)
         with self._writing():
             require_fit(self.recipe.stage, self._sizes(), name, shape, chunks, dims)
-            if not (self.path / DATA / "zarr.json").is_file():
-                write_whole(self.path / DATA / "zarr.json", group_metadata())
+            if not os.path.isfile(group := f"{self.path}/{DATA}/zarr.json"):
+                write_whole(group, group_metadata())
             write_whole(self._about(name), array_metadata(shape, kind, chunks, dims, attrs, fill_value))
         publish.STEP_HOOK("array created")
 
@@ -74,21 +80,22 @@ class FolderDraft(Draft):
         """Write one region of an array, see ``Draft``."""
         with self._writing():
             chunks = chunks_of(f"array {name!r} of {self.recipe.stage}", self._metadata_of(name), region, data)
-            folder = self.path / DATA / name
-            in_threads(lambda chunk: write_whole(folder / chunk[0], encoded(chunk[1])), chunks)
+            folder = f"{self.path}/{DATA}/{name}"
+            shared_out(lambda chunk: write_whole(f"{folder}/{chunk[0]}", encoded(chunk[1])), chunks, data.nbytes)
         publish.STEP_HOOK("chunk written")
 
     def has_array(self, name: str) -> bool:
         """Return whether ``create_array`` made an array of this name."""
-        return bool(NAME.fullmatch(name)) and self._about(name).is_file()
+        return bool(NAME.fullmatch(name)) and os.path.isfile(self._about(name))
 
     def holds(self, name: str, region: tuple[slice, ...] | None = None) -> bool:
         """Return whether a region of an array was written, see ``Draft``."""
         if not self.has_array(name):
             return False
-        about = json.loads(self._about(name).read_bytes())
+        about = json.loads(_content(self._about(name)))
         shape, chunks = about["shape"], about["chunk_grid"]["configuration"]["chunk_shape"]
-        return all((self.path / DATA / name / chunk).is_file() for chunk in chunk_paths(shape, chunks, region))
+        folder = f"{self.path}/{DATA}/{name}"
+        return all(os.path.isfile(f"{folder}/{chunk}") for chunk in chunk_paths(shape, chunks, region))
 
     def published(self) -> Entry | None:
         """Return the entry that the draft became, see ``Draft``."""
@@ -127,15 +134,17 @@ class FolderDraft(Draft):
         with writing(self.path):
             yield
 
-    def _about(self, name: str) -> Path:
-        return self.path / DATA / name / "zarr.json"
+    def _about(self, name: str) -> str:
+        return f"{self.path}/{DATA}/{name}/zarr.json"
 
     def _metadata(self) -> dict[str, dict[str, Any]]:
         """Return what zarr wrote of each array that is there.
 
         Read from the files: zarr would open every array, and a product of small ones would wait for that most.
         """
-        return {path.parent.name: json.loads(path.read_bytes()) for path in (self.path / DATA).glob("*/zarr.json")}
+        names = os.listdir(data) if os.path.isdir(data := f"{self.path}/{DATA}") else []
+        files = {name: self._about(name) for name in names}
+        return {name: json.loads(_content(file)) for name, file in files.items() if os.path.isfile(file)}
 
     def _sizes(self) -> dict[str, dict[str, int]]:
         """Return the length of each dimension of each array that is there."""
@@ -148,7 +157,7 @@ class FolderDraft(Draft):
         """Return the metadata file of one array; InvalidArray if it was not created."""
         if not self.has_array(name):
             raise InvalidArray(f"{self.recipe.stage} has no array {name!r}: create it before writing")
-        return self._about(name).read_bytes()
+        return _content(self._about(name))
 
     def _complete(self) -> list[str]:
         """Return the path of every file of the draft, once each is known to be there."""
@@ -159,7 +168,7 @@ class FolderDraft(Draft):
         for name, about in arrays.items():
             chunks = chunk_paths(about["shape"], about["chunk_grid"]["configuration"]["chunk_shape"])
             paths += [f"{DATA}/{name}/{path}" for path in ("zarr.json", *chunks)]
-        missing = [path for path in paths if not (self.path / path).is_file()]
+        missing = [path for path in paths if not os.path.isfile(f"{self.path}/{path}")]
         if missing:
             raise IncompleteDraft(
                 f"the draft of {self.recipe.stage} lacks {len(missing)} of {len(paths)} files, first {missing[0]}: "

@@ -13,7 +13,7 @@ from semidense.cache.entries.draft import FolderDraft, hold
 from semidense.cache.entries.entry import DATA, Entry
 from semidense.cache.entries.quarantine import set_aside_if_damaged
 from semidense.cache.errors import CacheUnavailable
-from semidense.cache.files import StateFile, make_folder, remove, writing
+from semidense.cache.files import StateFile, add_folder, remove, writing
 from semidense.cache.keys.recipe import Recipe
 from semidense.cache.keys.sources import keep_sources, kept_source
 from semidense.cache.layout import Layout
@@ -93,7 +93,7 @@ class FolderBackend:
         path = self.layout.draft(name, recipe.key, maker)
         draft = FolderDraft(recipe, label, time(), self.layout.root, path)
         with writing(path):
-            make_folder(path)
+            add_folder(path)
         publish.STEP_HOOK("begun")
         return draft
 

@@ -1,11 +1,12 @@
 """How an entry comes to exist: data first, record last.
 
 1. every chunk is there, and nothing else;
-2. each file is hashed, synced and made read-only;
-3. the manifest is written, the folders are synced and made read-only;
+2. each file is hashed and made read-only;
+3. the manifest is written, and the folders are made read-only;
 4. the record is written beside the draft;
 5. the draft is renamed to its place among the entries; nobody sees it yet;
-6. the record is linked to its name: now the entry exists.
+6. all files, the record and all folders are synced at one time: a disk needs little longer for many than for one;
+7. the record is linked to its name: now the entry exists.
 
 A kill at any point leaves a whole entry or nothing that anybody sees, and another process of the same
 run can go on from there: ``resume`` finds the data that were renamed by the record beside the draft.
@@ -21,21 +22,22 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
-from semidense.cache.entries.check import inspect, inspect_data, read_plain
+from semidense.cache.entries.check import MANIFESTS, RECORDS, inspect, inspect_data, read_plain
 from semidense.cache.entries.entry import MANIFEST, Entry, File, Manifest
 from semidense.cache.entries.quarantine import move_anything, set_aside
 from semidense.cache.errors import DamagedEntry, EntryNotFound, NonDeterministicStage
 from semidense.cache.files import (
+    add_folder,
     hash_file,
     in_threads,
-    make_folder,
     make_read_only,
     move_folder,
     remove,
+    shared_out,
     sync,
     walk,
     walk_folders,
-    write_synced,
+    write_new,
     writing,
 )
 from semidense.cache.layout import Layout
@@ -74,22 +76,19 @@ def remove_strays(folder: Path, expected: Iterable[str]) -> None:
 
 
 def seal(draft: Path, paths: Iterable[str]) -> Manifest:
-    """Hash and sync the draft's files, write their manifest, and make all of it read-only."""
-
-    def settle(path: str) -> File:
-        file = draft / path
-        make_read_only(file)
-        sync(file)
-        return File(path, file.stat().st_size, hash_file(file))
-
-    manifest = Manifest(tuple(in_threads(settle, sorted(paths))))
+    """Hash the draft's files, write their manifest, and make all of it read-only."""
+    names = sorted(paths)
+    files = [f"{draft}/{name}" for name in names]
+    sizes = [make_read_only(file) for file in files]
+    hashes = shared_out(hash_file, files, sum(sizes))
+    manifest = Manifest(tuple(map(File, names, sizes, hashes)))
     STEP_HOOK("hashed")
-    write_synced(draft / MANIFEST, manifest.to_bytes())
+    data = manifest.to_bytes()
+    write_new(draft / MANIFEST, data)
+    MANIFESTS.keep(manifest, data)
     STEP_HOOK("manifest written")
-    for folder in walk_folders(draft):
-        sync(folder)
-        if folder != draft:  # that one is still to be renamed, which changes its ".."
-            make_read_only(folder)
+    for folder in manifest.folders:  # not the draft itself: it is still to be renamed, which changes its ".."
+        make_read_only(f"{draft}/{folder}")
     STEP_HOOK("sealed")
     return manifest
 
@@ -131,7 +130,7 @@ def resume(layout: Layout, draft: Path, key: str) -> Entry | None:
         with suppress(FileNotFoundError, DamagedEntry):
             entry = Entry.from_bytes(key, read_plain(_record_beside(draft)))
             inspect_data(layout, entry, "full", remember=False)
-            _settle(layout.entry(key))
+            _settle(layout, draft, key)
             return _link_record(layout, draft, entry)
     return None
 
@@ -174,7 +173,7 @@ def _suspicion(old: object, new: object) -> str:
 def _place(layout: Layout, draft: Path, entry: Entry) -> None:
     """Rename the draft to the entry's folder; data without a record, of a writer killed here, make way."""
     target = layout.entry(entry.key)
-    make_folder(target.parent)
+    add_folder(target.parent)
     if os.path.lexists(target):
         orphan = draft.with_name(f"{draft.name}.{secrets.token_hex(4)}")
         move_anything(target, orphan)
@@ -182,14 +181,17 @@ def _place(layout: Layout, draft: Path, entry: Entry) -> None:
     STEP_HOOK("cleared")
     move_folder(draft, target)
     STEP_HOOK("renamed")
-    _settle(target)
+    _settle(layout, draft, entry.key)
     STEP_HOOK("entry synced")
 
 
-def _settle(folder: Path) -> None:
+def _settle(layout: Layout, draft: Path, key: str) -> None:
+    """Have an entry's files, the record beside its draft, and the names of all that is on the way to them on disk."""
+    folder, shelf = layout.entry(key), layout.record(key).parent
     make_read_only(folder)
-    sync(folder)
-    sync(folder.parent)
+    add_folder(shelf)
+    inside = [f"{folder}/{path}" for path, _ in walk(folder)]
+    in_threads(sync, [*inside, *map(str, (folder, *folder.parents[:2], shelf.parent, _record_beside(draft)))])
 
 
 def _record_beside(draft: Path) -> Path:
@@ -199,7 +201,9 @@ def _record_beside(draft: Path) -> Path:
 def _write_record(draft: Path, entry: Entry) -> None:
     """Write the record under another name, in place of one by a publisher that was killed."""
     remove(_record_beside(draft))
-    write_synced(_record_beside(draft), entry.to_bytes())
+    data = entry.to_bytes()
+    write_new(_record_beside(draft), data)
+    RECORDS.keep(entry.as_read(data), data, entry.key)
     STEP_HOOK("record written")
 
 
@@ -212,7 +216,6 @@ def discard(draft: Path) -> None:
 def _link_record(layout: Layout, draft: Path, entry: Entry) -> Entry:
     """Link the record, which is whole under another name: a link never replaces a record."""
     temporary, record = _record_beside(draft), layout.record(entry.key)
-    make_folder(record.parent)
     try:
         record.hardlink_to(temporary)
     except FileExistsError:

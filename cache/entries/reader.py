@@ -1,11 +1,13 @@
 """Read an entry's arrays through its manifest alone. Imports zarr: loaded when data are opened."""
 
 import json
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import zarr
+from zarr.core.metadata import ArrayV3Metadata
 from zarr.storage import LocalStore, StorePath
 
 from semidense.cache.entries import forks  # noqa: F401 - importing it makes reads in forked children safe
@@ -129,8 +131,14 @@ class EntryStore(Listing, LocalStore):
 
 def open_arrays(store: Any) -> "dict[str, zarr.Array[Any]]":  # noqa: ANN401 - what all backends' stores have in common
     """Return the arrays of an entry's store by name, as zarr opens them, but without a wait for its event loop."""
-    about = {name: store.read(f"{name}/zarr.json") for name in store.arrays()}
-    return {name: zarr.Array.from_dict(StorePath(store, name), json.loads(data)) for name, data in about.items()}
+    about = {name: _described(store.read(f"{name}/zarr.json")) for name in store.arrays()}
+    return {name: zarr.Array(zarr.AsyncArray(data, StorePath(store, name))) for name, data in about.items()}
+
+
+@lru_cache(256)
+def _described(data: bytes) -> ArrayV3Metadata:
+    """Return what a metadata file says, parsed once for all arrays of a form: the scenes of a data set share theirs."""
+    return ArrayV3Metadata.from_dict(json.loads(data))
 
 
 def values_of(array: "zarr.Array[Any]") -> "NDArray[Any]":

@@ -2,7 +2,7 @@
 
 import threading
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
@@ -36,6 +36,7 @@ class Recent:
 
     def __init__(self) -> None:
         self._kept: OrderedDict[str, dict[str, Labelled]] = OrderedDict()
+        self._size = 0
         self._lock = threading.Lock()
 
     def __reduce__(self) -> tuple[type["Recent"], tuple[()]]:
@@ -76,9 +77,10 @@ class Recent:
     def _keep(self, key: str, arrays: dict[str, Labelled]) -> None:
         """Keep a product, and drop those that were not read for longest."""
         with self._lock:
+            self._size += _bytes(arrays) - _bytes(self._kept.get(key, {}))
             self._kept[key] = arrays
-            while sum(map(_bytes, self._kept.values())) > MOST_BYTES:
-                self._kept.popitem(last=False)
+            while self._size > MOST_BYTES:
+                self._size -= _bytes(self._kept.popitem(last=False)[1])
 
 
 def _bytes(arrays: dict[str, Labelled]) -> int:
@@ -159,6 +161,11 @@ class Job:
     inputs: Mapping[str, tuple[str, ...]]
     draft: Draft | None
     made: Made | None
+
+
+def flat(results: Iterable[Made | Sequence[Made]]) -> list[Made]:
+    """Return what tasks made: some made one product, some several."""
+    return [made for each in results for made in ([each] if isinstance(each, Made) else each)]
 
 
 @contextmanager

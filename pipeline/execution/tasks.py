@@ -6,7 +6,7 @@ another worker too: it finds the draft that was begun, the tile that was written
 """
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -17,12 +17,12 @@ from semidense.cache import (
     EntryNotFound,
     IncompleteDraft,
     Recipe,
-    Store,
     require_imported_as_hashed,
 )
 from semidense.pipeline.execution.checkpoints import Checkpoints
-from semidense.pipeline.execution.jobs import Context, Job, Span, Unread, explained
-from semidense.pipeline.execution.tiles import Rows, read_block, trim
+from semidense.pipeline.execution.claims import RunStopped
+from semidense.pipeline.execution.jobs import Context, Job, Span, Unread, explained, flat
+from semidense.pipeline.execution.tiles import Rows, cut_rows, read_block, trim
 from semidense.pipeline.plan.environment import cpu_name, version
 from semidense.pipeline.plan.errors import StageFailed
 from semidense.pipeline.plan.plan import Made
@@ -32,14 +32,43 @@ from semidense.stages.stage import Array, Arrays, Output
 VERSIONS = ("semidense-stereo", "dask", "numpy", "torch", "xarray", "zarr")
 
 
-def begin(context: Context, step: Step, inputs: Sequence[Made], forced: bool, tiles: int) -> Job:
+def make_all(
+    context: Context, steps: Sequence[Step], inputs: Sequence[Made | Sequence[Made]], forced: Container[str]
+) -> list[Made]:
+    """Make small products of a scene one after the other, each published by itself; return them in order.
+
+    Run again after its worker died, this finds what it published, and goes on with what it began.
+
+    Raises:
+        RunStopped: if the run ended meanwhile.
+    """
+    by_id = {made.step.id: made for made in flat(inputs)}
+    for step in steps:
+        if not context.claims.lease.is_seen():
+            raise RunStopped("the run ended before this was begun")
+        needed = [by_id[each] for ids in step.inputs.values() for each in ids]
+        by_id[step.id] = _make(context, step, needed, step.product in forced)
+    return [by_id[step.id] for step in steps]
+
+
+def _make(context: Context, step: Step, inputs: Sequence[Made], forced: bool) -> Made:
+    job = begin(context, step, inputs, forced, step.tiles)
+    if step.stage.tile_rows is None or step.size is None:
+        return publish(context, job, [make_whole(context, job)])
+    job = create_arrays(job)
+    return publish(
+        context, job, [make_tile(context, job, rows) for rows in cut_rows(step.size[0], step.stage.tile_rows)]
+    )
+
+
+def begin(context: Context, step: Step, inputs: Sequence[Made | Sequence[Made]], forced: bool, tiles: int) -> Job:
     """Return the job of a step whose inputs are there; of a step whose result is there, a finished job."""
-    by_id = {made.step.id: made for made in inputs}
+    by_id = {made.step.id: made for made in flat(inputs)}
     recipe = step.recipe({step_id: made.digest for step_id, made in by_id.items()})
     keys = {product: tuple(by_id[each].key for each in ids) for product, ids in step.inputs.items()}
     with explained(step):
         context.admit(step)
-        if not forced and (made := _find(context, step, recipe)):
+        if not forced and (made := _find(context, step, recipe)[0]):
             context.claims.lease.add([recipe.key])
             return Job(step, keys, None, made)
         context.claims.take(recipe.key, lambda holder: context.watch.waiting(step, holder))
@@ -54,30 +83,27 @@ def _begin_claimed(
     context: Context, step: Step, recipe: Recipe, keys: Mapping[str, tuple[str, ...]], forced: bool, tiles: int
 ) -> Job:
     """Look again, now that nobody else makes the product, and begin a draft."""
-    if not forced and (made := _find(context, step, recipe)):
+    made, damage = _find(context, step, recipe)
+    if made and not forced:
         context.claims.release(recipe.key)
         return Job(step, keys, None, made)
-    _set_damaged_aside(context.store, recipe.key)
+    if damage:  # the new one is not to be taken for a second writer's
+        with suppress(DamagedEntry, EntryNotFound):
+            context.store.require(recipe.key)
     with context.claims.opening():
         draft = context.store.begin(recipe, step.label, context.claims.lease, step.id)
         context.watch.begun(step, draft, tiles)
     return Job(step, keys, draft, None)
 
 
-def _find(context: Context, step: Step, recipe: Recipe) -> Made | None:
-    """Return a step's result if it is there and sound; this very run may have made it."""
+def _find(context: Context, step: Step, recipe: Recipe) -> tuple[Made | None, str | None]:
+    """Return a step's result if it is there and sound, and what is wrong with it; this very run may have made it."""
     run = context.claims.lease.name
     entry, damage = context.store.look(recipe.key)
     if entry is None or damage:
-        return None
-    return Made(step, entry.key, entry.digest, entry.seconds, reused=run is None or entry.extras.get("run") != run)
-
-
-def _set_damaged_aside(store: Store, key: str) -> None:
-    """Move a damaged entry out of the way, so that the new one is not taken for a second writer's."""
-    if store.find(key) and store.check(key):
-        with suppress(DamagedEntry, EntryNotFound):
-            store.require(key)
+        return None, damage
+    reused = run is None or entry.extras.get("run") != run
+    return Made(step, entry.key, entry.digest, entry.seconds, reused), None
 
 
 def make_tile(context: Context, job: Job, rows: Rows) -> Span | None:
@@ -179,7 +205,8 @@ def publish(context: Context, job: Job, spans: Sequence[Span | None]) -> Made:
             try:
                 context.admit(job.step)
                 entry = _publish(job.draft, seconds, _extras(context, job.step))
-                context.store.checkpoint(entry.key).remove()
+                if job.step.stage.monitored:
+                    context.store.checkpoint(entry.key).remove()
             finally:
                 context.claims.release(job.draft.recipe.key)
         made = Made(job.step, entry.key, entry.digest, seconds, reused=False)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from semidense.cache import document
-from semidense.cache.document import canonical, digest, laid_out, parse, plain, seal, unseal
+from semidense.cache.document import Documents, canonical, digest, laid_out, parse, plain, seal, unseal
 from semidense.cache.errors import InvalidRecipe
 
 scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text()
@@ -154,3 +154,16 @@ def test_a_document_of_many_texts_costs_few_calls(monkeypatch: pytest.MonkeyPatc
     unseal("thing", data)
     assert {*calls} == {"laid_out"}  # what JSON says is plain: nothing goes through it again
     assert len(calls) < 30
+
+
+def test_a_process_parses_the_same_bytes_once() -> None:
+    parsed: list[bytes] = []
+    documents = Documents(lambda data: parsed.append(data) or data.decode(), most=2)
+    assert [documents.read(data) for data in (b"a", b"b", b"a")] == ["a", "b", "a"]
+    assert parsed == [b"a", b"b"]
+    assert documents.keep("c", b"c") == documents.read(b"c") == "c", "what was written is known"
+    documents.read(b"a")
+    assert parsed == [b"a", b"b", b"a"], "the one that was kept first has made way"
+    documents.forget()
+    documents.read(b"c")
+    assert parsed[-1] == b"c"

@@ -17,7 +17,7 @@ from semidense.cache.files import (
     make_folder,
     remove,
     walk,
-    write_synced,
+    write_new,
     write_whole,
     writing,
 )
@@ -51,10 +51,10 @@ def test_the_cache_s_own_errors_pass() -> None:
 def test_read_only_trees_can_be_removed_and_links_are_not_followed(tmp_path: Path) -> None:
     outside = tmp_path / "outside"
     make_folder(outside)
-    write_synced(outside / "kept", b"1")
+    write_new(outside / "kept", b"1")
     inner = tmp_path / "tree" / "inner"
     make_folder(inner)
-    write_synced(inner / "file", b"2")
+    write_new(inner / "file", b"2")
     (inner / "link").symlink_to(outside)
     for folder in (inner, inner.parent):
         folder.chmod(0o555)
@@ -64,10 +64,10 @@ def test_read_only_trees_can_be_removed_and_links_are_not_followed(tmp_path: Pat
 
 
 def test_written_files_are_read_only_and_never_replaced(tmp_path: Path) -> None:
-    write_synced(tmp_path / "file", b"1")
+    write_new(tmp_path / "file", b"1")
     assert (tmp_path / "file").stat().st_mode & 0o222 == 0
     with pytest.raises(FileExistsError):
-        write_synced(tmp_path / "file", b"2")
+        write_new(tmp_path / "file", b"2")
 
 
 def test_threads_keep_order_and_pass_errors_on() -> None:

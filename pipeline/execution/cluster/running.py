@@ -9,6 +9,8 @@ from typing import Any
 
 from semidense.cache import CacheUnavailable, Lease, Store
 from semidense.pipeline.execution.cluster.deployment import connected, require_able
+from semidense.pipeline.execution.graph import Tasks
+from semidense.pipeline.execution.jobs import flat
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.plan.errors import StageFailed, StageRefused, UsageError
 from semidense.pipeline.plan.plan import Made
@@ -21,14 +23,10 @@ _PAUSE, _LOOK = 0.02, 1.0
 """Seconds between two looks at what is done, and at who is there."""
 
 
-Tasks = tuple[Mapping[str, Any], Sequence[str]]
-"""Dask's tasks by key, and the keys of those whose results are wanted."""
-
-
 def run_on_cluster(
     tasks: Callable[[], Tasks], code: Mapping[str, str], store: Store, lease: Lease, watch: Watch, address: str
-) -> dict[str, Made]:
-    """Carry out tasks on a cluster and return the results by their step's id, in their order.
+) -> list[Made]:
+    """Carry out tasks on a cluster and return the results as they came.
 
     Args:
         tasks: gives the tasks; wanted are the ``Made`` of each step.
@@ -51,13 +49,13 @@ def run_on_cluster(
         graph, keys = tasks()
         futures = client.get(graph, list(keys), sync=False)
         try:
-            made = {each.step.id: each for each in _arriving(client, futures, watch)}
+            made = list(_arriving(client, futures, watch))
         except BaseException:
             _abandon(client, lease)
             raise
         if told := _time_line(client, began):
             watch.deployed(told)
-        return {step_id: made[step_id] for step_id in (future.result().step.id for future in futures)}
+        return made
 
 
 def _note_tasks(client: Any) -> None:  # noqa: ANN401
@@ -138,10 +136,10 @@ def _arriving(client: Any, futures: Sequence[Any], watch: Watch) -> Iterator[Mad
     workers = _Workers(client)
     while arriving.count():
         for future in arriving.next_batch(block=False):
-            made: Made = future.result()
-            if not made.reused:
-                watch.published(made)
-            yield made
+            for made in flat([future.result()]):
+                if not made.reused:
+                    watch.published(made)
+                yield made
         workers.require()
         time.sleep(_PAUSE)
 

@@ -1,3 +1,4 @@
+import os
 import pickle
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -323,3 +324,34 @@ def test_a_root_that_is_a_file_is_explained(tmp_path: Path, recipe: Recipe) -> N
     (tmp_path / "file").write_text("")
     with pytest.raises(CacheUnavailable, match=f"^cannot write to the cache at {tmp_path / 'file'}[^\n]*: [^\n]+file"):
         Store(tmp_path / "file").begin(recipe, {})
+
+
+def test_who_goes_on_for_a_killed_publisher_has_all_on_disk_before_the_record_is_linked(
+    store: Store, recipe: Recipe, filled: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Killed(BaseException):
+        pass
+
+    def kill(step: str) -> None:
+        if step == "renamed":
+            raise Killed
+
+    monkeypatch.setattr(publish, "discard", lambda draft: None)
+    monkeypatch.setattr(publish, "STEP_HOOK", kill)
+    draft = store.begin(recipe, {})
+    filled(draft)
+    with pytest.raises(Killed):
+        draft.publish(1, {})
+    synced: list[set[int]] = [set()]
+    real = os.fsync
+
+    def note(handle: int) -> None:
+        real(handle)
+        synced[-1].add(os.fstat(handle).st_ino)
+
+    monkeypatch.setattr("os.fsync", note)
+    monkeypatch.setattr(publish, "STEP_HOOK", lambda step: synced.append(set()) if step == "record linked" else None)
+    assert draft.published() == store.require(recipe.key)
+    folder = store.layout.entry(recipe.key)
+    inside = {path.stat().st_ino for path in (folder, *folder.rglob("*"), store.layout.record(recipe.key))}
+    assert inside <= synced[0]

@@ -1,4 +1,5 @@
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -6,6 +7,7 @@ import numpy as np
 import pytest
 
 from semidense.cache import Entry, NonDeterministicStage, Recipe, Store
+from semidense.cache.entries import check, publish
 from semidense.cache.entries.publish import STEPS
 from semidense.cache.files import walk
 
@@ -201,3 +203,42 @@ def test_without_working_locks_nothing_wrong_is_ever_read(
         elif content == "same":
             make(store)
             assert store.check(recipe.key) is None
+
+
+def test_all_of_an_entry_is_on_disk_before_its_record_is_linked(
+    store: Store, make: Callable[..., Entry], recipe: Recipe, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: set[int] = set()
+    linked: list[set[int]] = []
+    real = os.fsync
+
+    def note(handle: int) -> None:
+        real(handle)
+        synced.add(os.fstat(handle).st_ino)
+
+    monkeypatch.setattr("os.fsync", note)
+    monkeypatch.setattr(publish, "STEP_HOOK", lambda step: linked.append({*synced}) if step == "entry synced" else None)
+    make(store)
+    folder, record = store.layout.entry(recipe.key), store.layout.record(recipe.key)
+    inside = [folder / path for path, _ in walk(folder)]
+    needed = [*inside, folder, *folder.parents[:2], record, record.parent.parent]
+    assert {path.stat().st_ino for path in needed} <= linked[0]
+    assert record.parent.stat().st_ino in synced, "so is the name that makes it exist, in the end"
+
+
+def test_what_was_published_here_is_not_parsed_again(
+    store: Store, make: Callable[..., Entry], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry = make(store, zeta=1, alpha=2)
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("parsed")
+
+    for documents in (check.RECORDS, check.MANIFESTS):
+        monkeypatch.setattr(documents, "_parse", refuse)
+    known = store.require(entry.key)
+    monkeypatch.undo()
+    check.forget()
+    parsed = store.require(entry.key)
+    assert known == parsed == entry
+    assert str(known) == str(parsed), "their mappings have the same order, too"
