@@ -13,9 +13,8 @@ from semidense.stages.compute.threads import one_thread
 from semidense.stages.evaluation.agreement import padded_agreement
 from semidense.stages.evaluation.declaration import RADIUS, Confidence, ConfidenceParams, Judged
 from semidense.stages.evaluation.layers import evaluation_layers
-from semidense.stages.evaluation.net import EvaluationNet
+from semidense.stages.evaluation.net import EvaluationNet, evaluation_net_from_parameters
 from semidense.stages.evaluation.silence.veto import vetoed
-from semidense.stages.learning.parameters import from_vector
 from semidense.stages.stage import require_shape
 
 
@@ -95,12 +94,10 @@ def weigh_in(
 
 def compute_confidence(params: ConfidenceParams, inputs: Judged) -> Confidence:
     """Return one tile of the confidence map, from a block with its halo."""
-    net = EvaluationNet()
-    from_vector(net, inputs["evaluation_net"]["parameters"])
+    net = evaluation_net_from_parameters(inputs["evaluation_net"]["parameters"])
     images = inputs["images"]
     disparity = inputs["disparity"]["disparity"]
     layers = evaluation_layers(images["left"], images["moments"][0], disparity)
-    net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     log_odds = padded_log_odds(net, layers, params.precision, params.flipped)
     agreeing = padded_agreement(disparity, params.window)
     weighed = weigh_in(log_odds, agreeing, params.agreement, params.typical)

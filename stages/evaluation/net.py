@@ -21,6 +21,7 @@ fourth pixel, for a quarter or a sixteenth of the work.
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -31,6 +32,7 @@ from torch.nn import functional
 
 from semidense.stages.compute.kernel import kernel
 from semidense.stages.evaluation.declaration import PATCH, STRIDE
+from semidense.stages.learning.parameters import from_vector
 
 DISPARITY_UNIT = 5.0
 """Disparities, in px, are divided by this: one scale for all scenes, on which an error of 1 px still shows."""
@@ -101,6 +103,21 @@ class EvaluationNet(nn.Module):
     def _head(self, features: Tensor) -> Tensor:
         logits: Tensor = self.out(functional.relu(self.fc(features)))
         return logits
+
+
+def evaluation_net_from_parameters(parameters: NDArray[np.float32]) -> EvaluationNet:
+    """Return the network that a vector of parameters, as ``to_vector`` makes them, belongs to, ready for inference.
+
+    It is built once for all tiles of a map, so nobody may change it.
+    """
+    return _built(np.ascontiguousarray(parameters, np.float32).tobytes())
+
+
+@lru_cache(maxsize=2)
+def _built(parameters: bytes) -> EvaluationNet:
+    net = EvaluationNet()
+    from_vector(net, np.frombuffer(parameters, np.float32))
+    return net.to(memory_format=torch.channels_last)  # type: ignore[call-overload, no-any-return]
 
 
 def _halves(layers: Tensor) -> tuple[Tensor, Tensor]:

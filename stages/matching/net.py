@@ -18,6 +18,7 @@ The same class trains and infers, on patches and on whole images, because of thr
 3. A fully connected layer on a 5 x 5 map is a 5 x 5 convolution.
 """
 
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -147,7 +148,7 @@ def require_views(net: MatchingNet, views: NDArray[np.float32]) -> None:
 def net_from_parameters(parameters: NDArray[np.float32], channels: int) -> MatchingNet:
     """Return the network that a vector of parameters belongs to, ready for inference.
 
-    The head follows from the number of parameters.
+    The head follows from the number of parameters. It is built once for all tiles of a volume, so nobody may change it.
 
     Args:
         parameters: float32 (parameter,), as ``to_vector`` makes them.
@@ -156,13 +157,21 @@ def net_from_parameters(parameters: NDArray[np.float32], channels: int) -> Match
     Raises:
         StageError: if no head fits: the network was trained on other channels.
     """
+    return _built(np.ascontiguousarray(parameters, np.float32).tobytes(), channels)
+
+
+@lru_cache(maxsize=2)
+def _built(parameters: bytes, channels: int) -> MatchingNet:
+    vector = np.frombuffer(parameters, np.float32)
     for head in HEADS:
-        net = MatchingNet(channels, head)
-        if count(net) == parameters.size:
-            from_vector(net, parameters)
+        with torch.device("meta"):  # only to be counted: to draw its weights would take longer than a small tile
+            fits = count(MatchingNet(channels, head)) == vector.size
+        if fits:
+            net = MatchingNet(channels, head)
+            from_vector(net, vector)
             return net.to(memory_format=torch.channels_last)  # type: ignore[call-overload, no-any-return]
     raise StageError(
-        f"the matching-Net's {parameters.size} parameters do not fit {channels} channel(s) a view: "
+        f"the matching-Net's {vector.size} parameters do not fit {channels} channel(s) a view: "
         "it was trained on other channels; train one for these, or go back to the channels it knows"
     )
 

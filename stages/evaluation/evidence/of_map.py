@@ -3,7 +3,6 @@
 from typing import Literal
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
@@ -16,8 +15,7 @@ from semidense.stages.evaluation.evidence.likeness import distinctiveness, suppo
 from semidense.stages.evaluation.evidence.overlap import overlap
 from semidense.stages.evaluation.evidence.windows import window_mean
 from semidense.stages.evaluation.layers import evaluation_layers
-from semidense.stages.evaluation.net import EvaluationNet
-from semidense.stages.learning.parameters import from_vector
+from semidense.stages.evaluation.net import evaluation_net_from_parameters
 from semidense.stages.stage import Images, Network
 from semidense.stages.transforms.gray import to_gray
 
@@ -85,9 +83,7 @@ def _network_log_odds(
     images: Images, disparity: NDArray[np.float32], evaluation_net: Network, precision: Precision
 ) -> NDArray[np.float32]:
     """Return the evaluation-Net's log-odds (y, x): it looks at every fourth pixel of every fourth row."""
-    net = EvaluationNet()
-    from_vector(net, evaluation_net["parameters"])
-    net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    net = evaluation_net_from_parameters(evaluation_net["parameters"])
     layers = evaluation_layers(images["left"], images["moments"][0], disparity)
     return padded_log_odds(net, layers, precision, step=STEP)
 
