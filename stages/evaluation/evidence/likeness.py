@@ -87,9 +87,10 @@ def _write_support(
             agreeing, total = np.float32(0), np.float32(0)
             for row in range(y - SUPPORT_RADIUS, y + SUPPORT_RADIUS + 1, SUPPORT_STEP):
                 for column in range(x - SUPPORT_RADIUS, x + SUPPORT_RADIUS + 1, SUPPORT_STEP):
-                    weight = weights[abs(gray[row, column] - gray[y, x])]
+                    # The pixel itself is left out here: beside it the weights of unlike neighbours would be lost.
+                    own = row == y and column == x
+                    weight = np.float32(0) if own else weights[abs(gray[row, column] - gray[y, x])]
                     total += weight
                     if abs(disparity[row, column] - disparity[y, x]) <= tolerance:
                         agreeing += weight
-            own = np.float32(0) if np.isnan(disparity[y, x]) else weights[0]
-            found[y - RADIUS, x - RADIUS] = (agreeing - own) / (total - weights[0])
+            found[y - RADIUS, x - RADIUS] = agreeing / total

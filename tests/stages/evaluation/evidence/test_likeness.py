@@ -37,3 +37,12 @@ def test_a_hole_supports_nothing() -> None:
     found = support(disparity, np.full(disparity.shape, 9, np.uint8))[0]
     # Of 13 x 13 pixels, 7 columns of 13 have a disparity; the pixel itself does not count.
     np.testing.assert_allclose(found, [(7 * 13 - 1) / 168, 0], rtol=1e-5)
+
+
+def test_a_pixel_unlike_all_its_neighbours_is_supported_by_them_all_the_same() -> None:
+    gray = np.zeros((101, 101), np.uint8)
+    gray[50, 50] = 255
+    disparity = np.full(gray.shape, 7, np.float32)
+    assert support(disparity, gray).tolist() == [[1.0]]
+    disparity[:50] = 3
+    assert np.allclose(support(disparity, gray), 90 / 168)
