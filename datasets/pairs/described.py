@@ -23,7 +23,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
@@ -102,6 +102,12 @@ def _check(path: Path, entries: Mapping[str, Any]) -> None:
     for role in ("left", "right"):
         if role not in entries:
             raise DatasetError(f'{path}: no {role}; write a pattern such as {role} = "{role}/*.png"')
+    for role in _ROLES:
+        pattern = PurePath(entries.get(role, role))
+        if not pattern.name or pattern.anchor:
+            raise DatasetError(
+                f"{path}: {role} = {entries[role]!r}; give a pattern that is relative to the folder of this file"
+            )
     if entries.get("split", "test") not in ("train", "test"):
         raise DatasetError(f"{path}: split = {entries['split']!r}; give train or test")
     if not entries.get("scale", 1):

@@ -83,6 +83,9 @@ def test_the_scale_is_part_of_what_the_truth_is(folder: Path) -> None:
         pytest.param('left = "*/*.png"\nright = "right/*.png"\n', r"give one \*", id="two stars"),
         pytest.param('left = "none/*.png"\nright = "right/*.png"\n', "no left view", id="nothing there"),
         pytest.param('left = "left/*.png"\nright = "scenes/*/im1.jpg"\n', "no right view for .*a.png", id="no pair"),
+        pytest.param('left = "/data/*.png"\nright = "right/*.png"\n', "left = '/data/.*relative to", id="absolute"),
+        pytest.param(VIEWS + 'truth = ""\nscale = 1\n', "truth = ''; give a pattern", id="empty"),
+        pytest.param(VIEWS + 'mask = "."\n', "mask = '.'; give a pattern", id="a folder alone"),
         pytest.param("left = [\n", "no valid TOML", id="no TOML"),
     ],
 )
