@@ -35,11 +35,12 @@ def features(
     """
     if "evidence" not in disparity:
         raise StageError("the disparity map brings no evidence of its costs: set use.disparity=aggregated")
-    evidence = np.nan_to_num(disparity["evidence"].astype(np.float32))
+    evidence = disparity["evidence"].astype(np.float32)
     margin, difference, agrees = (
         evidence[FEATURES.index(name)] for name in ("aggregated_margin", "left_right", "agrees")
     )
-    around = margin, (difference > 1).astype(np.float32), agrees
+    differs = np.where(np.isnan(difference), difference, difference > 1)
+    around = margin, differs, agrees  # of the pixels that have a disparity: a hole beside them changes nothing
     means = [window_mean(each, side) for each in around for side in MEANS]
     from_map = of_map(images, disparity["disparity"], evaluation_net, precision)
     return compressed(np.concatenate([from_map, middle(evidence), means]))

@@ -30,8 +30,7 @@ def train_evidence_net(params: EvidenceNetParams, inputs: OfEvidenceSamples, mon
     right = (errors <= params.tolerance).float()
     net = EvidenceNet()
     initialise(net, params.seed)
-    net.centre.copy_(known.mean(dim=0))
-    net.scale.copy_(known.std(dim=0, correction=0).clamp(min=1e-3))
+    net.measure(known)
 
     def loss(step: int, shard: int) -> Tensor:
         rng = np.random.default_rng((params.seed, step, shard))

@@ -32,8 +32,7 @@ def train_foreign_net(params: ForeignNetParams, inputs: OfForeignSamples, monito
     right = torch.from_numpy((error <= params.tolerance).astype(np.float32))
     net = EvidenceNet(known.shape[1])
     initialise(net, params.seed)
-    net.centre.copy_(known.mean(dim=0))
-    net.scale.copy_(known.std(dim=0, correction=0).clamp(min=1e-3))
+    net.measure(known)
 
     def loss(step: int, shard: int) -> Tensor:
         rng = np.random.default_rng((params.seed, step, shard))

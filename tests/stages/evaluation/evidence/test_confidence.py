@@ -1,6 +1,9 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import semidense.stages.weights
 from semidense.stages.disparity.evidence import FEATURES
 from semidense.stages.evaluation.agreement import agreement
 from semidense.stages.evaluation.confidence import confidence
@@ -18,6 +21,7 @@ from semidense.stages.evaluation.evidence.of_map import STEP, opened
 from semidense.stages.evaluation.layers import evaluation_layers
 from semidense.stages.learning.parameters import initialise, to_vector
 from semidense.stages.stage import Stage, StageError
+from semidense.stages.weights import read_weights
 from tests.stages.evaluation.reference import random_net, scene
 from tests.stages.tiling import tiled, whole
 
@@ -64,14 +68,49 @@ def test_the_features_are_what_they_are_called() -> None:
         assert told[name][0, 0] == 0, "nothing is known where there is no evidence"
     for window in (9, 25):
         assert np.allclose(told[f"agreement {window}"], agreement(disparity, window), atol=1e-4)
-    beyond = np.pad(np.nan_to_num(evidence), ((0, 0), (4, 4), (4, 4)), mode="edge")
+    beyond = np.pad(evidence, ((0, 0), (4, 4), (4, 4)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(beyond, (9, 9), axis=(1, 2))
     margin, difference, agrees = (
         windows[FEATURES.index(name)] for name in ("aggregated_margin", "left_right", "agrees")
     )
-    assert np.allclose(told["aggregated_margin 9"], margin.mean(axis=(2, 3)), rtol=1e-4)
-    assert np.allclose(told["left_right 9"], (difference > 1).mean(axis=(2, 3)), atol=1e-4)
-    assert np.allclose(told["agrees 9"], agrees.mean(axis=(2, 3)), atol=1e-4)
+    assert np.allclose(told["aggregated_margin 9"], np.nanmean(margin, axis=(2, 3)), rtol=1e-4)
+    differs = np.where(np.isnan(difference), np.nan, difference > 1)
+    assert np.allclose(told["left_right 9"], np.nanmean(differs, axis=(2, 3)), atol=1e-4)
+    assert np.allclose(told["agrees 9"], np.nanmean(agrees, axis=(2, 3)), atol=1e-4)
+
+
+def with_a_hole(margin: float) -> dict[str, dict[str, np.ndarray]]:
+    """Return a scene of one plane whose costs say the same of each pixel, and whose left columns have no disparity."""
+    given = products(height=40, width=90)
+    disparity = np.full((40, 90), 9, np.float32)
+    evidence = np.zeros((len(FEATURES), 40, 90), np.float16)
+    for name in ("aggregated_margin", "single_margin", "left_right"):
+        evidence[FEATURES.index(name)] = margin
+    evidence[FEATURES.index("agrees")] = 1
+    disparity[:, :30] = evidence[:, :, :30] = np.nan
+    return {**given, "disparity": {"disparity": disparity, "evidence": evidence}}
+
+
+def test_what_costs_say_around_a_pixel_is_told_of_those_with_a_disparity() -> None:
+    given = with_a_hole(margin=3)
+    known = of_whole_map(given["images"], given["disparity"], given["evaluation_net"], "float32")
+    around = opened(known[-len(OF_NEIGHBOURS) :])[:, :, 30:]
+    assert np.allclose(around, np.float32([3, 3, 1, 1, 1, 1])[:, None, None], atol=1e-4)
+
+
+@pytest.mark.parametrize("folder", ["", "general/"])
+@pytest.mark.parametrize("margin", [0.5, 2, 8])
+def test_a_hole_beside_a_pixel_makes_it_no_surer(folder: str, margin: float) -> None:
+    """Right pixels of a far range begin beside a band without disparities, which no training scene has."""
+    weights = Path(semidense.stages.weights.__file__).parent / folder
+    given = with_a_hole(margin)
+    nets = {
+        product: read_weights(product, (weights / f"{product}.safetensors").read_bytes())
+        for product in ("evaluation_net", "evidence_net")
+    }
+    known = of_whole_map(given["images"], given["disparity"], nets["evaluation_net"], "float32")
+    odds = weigh(nets["evidence_net"]["parameters"], known)
+    assert odds[10:30, 30:45].max() <= odds[10:30, 60:80].max() + 0.5
 
 
 def test_the_evaluation_net_answers_at_every_fourth_pixel() -> None:

@@ -1,12 +1,15 @@
 import numpy as np
 import pytest
+import torch
 
 from semidense.stages.disparity.evidence import FEATURES
 from semidense.stages.evaluation.evidence.confidence import weigh
 from semidense.stages.evaluation.evidence.declaration import EVIDENCE_NET, EvidenceNetParams, EvidenceSamplesParams
 from semidense.stages.evaluation.evidence.features import of_whole_map
+from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.evidence.samples import draw_evidence_samples
 from semidense.stages.evaluation.evidence.train import train_evidence_net
+from semidense.stages.learning.parameters import initialise
 from tests.stages.evaluation.evidence.test_confidence import products
 from tests.stages.monitors import InterruptedTrainingError, Memory
 
@@ -55,3 +58,17 @@ def test_a_training_that_was_killed_ends_as_an_undisturbed_one() -> None:
     again = train_evidence_net(PARAMS, training(), resumed)
     assert resumed.steps[0] == 41
     assert all(np.array_equal(again[name], array) for name, array in train_evidence_net(PARAMS, training()).items())
+
+
+def test_a_number_that_never_varied_in_training_does_not_count_later() -> None:
+    net, rng = EvidenceNet(3), np.random.default_rng(0)
+    initialise(net, 0)
+    known = torch.from_numpy(rng.normal(size=(50, 3)).astype(np.float32))
+    known[:, 1] = 0.7
+    net.measure(known)
+    with torch.inference_mode():
+        before = net(known)
+        known[:, 1] = torch.from_numpy(rng.normal(size=50))
+        assert torch.allclose(net(known), before, atol=1e-5)
+        known[:, 0] += 1
+        assert not torch.allclose(net(known), before, atol=1e-2)
