@@ -15,7 +15,7 @@ from semidense.stages.evaluation.declaration import RADIUS, Confidence, Confiden
 from semidense.stages.evaluation.layers import evaluation_layers
 from semidense.stages.evaluation.net import EvaluationNet, evaluation_net_from_parameters
 from semidense.stages.evaluation.silence.veto import vetoed
-from semidense.stages.stage import require_shape
+from semidense.stages.stage import StageError, require_shape
 
 
 def confidence(
@@ -49,7 +49,12 @@ def padded_log_odds(
 
     With a ``step`` the net answers at every second or fourth pixel only, from the first row and column on, and the
     pixels between are interpolated.
+
+    Raises:
+        StageError: with a step and ``flipped``: upside down the answers would be those of other rows.
     """
+    if flipped and step > 1:
+        raise StageError(f"a step of {step} px and flipped exclude each other")
     with torch.inference_mode(), autocast(precision):
         maps = torch.from_numpy(np.ascontiguousarray(layers)).unsqueeze(0)
         log_odds = net.dense(maps.contiguous(memory_format=torch.channels_last), step)

@@ -114,6 +114,7 @@ def photograph_viewer(browser: Any, folder: Path) -> None:  # noqa: ANN401
         model = "Bokeh.documents[0].get_model_by_name"
         for control, start in CHOSEN:
             option = f"{model}('{control}').options.find((each) => each.startsWith('{start}'))"
+            page.wait_for_function(f"{option} !== undefined")  # the choice before it may still be being drawn
             page.evaluate(f"{model}('{control}').value = {option}")
             page.wait_for_timeout(WAIT)
         for control, value in PIXEL.items():

@@ -213,9 +213,11 @@ assert code(in_child(work)) == -signal.SIGKILL
         assert list(store.layout.drafts.iterdir()) == []
 
 
-def test_renamed_data_are_published_only_if_they_are_what_the_record_beside_the_draft_says(
+def killed_once_renamed(
     store: Store, recipe: Recipe, filled: Callable[..., None], monkeypatch: pytest.MonkeyPatch
-) -> None:
+) -> Draft:
+    """Return a draft whose publisher was killed when its data had been renamed."""
+
     class Killed(BaseException):
         pass
 
@@ -229,6 +231,13 @@ def test_renamed_data_are_published_only_if_they_are_what_the_record_beside_the_
     filled(draft)
     with pytest.raises(Killed):
         draft.publish(1, {})
+    return draft
+
+
+def test_renamed_data_are_published_only_if_they_are_what_the_record_beside_the_draft_says(
+    store: Store, recipe: Recipe, filled: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draft = killed_once_renamed(store, recipe, filled, monkeypatch)
     chunk = store.layout.entry(recipe.key) / "data.zarr/map/c/1/0"
     chunk.chmod(0o600)
     good = chunk.read_bytes()
@@ -329,19 +338,7 @@ def test_a_root_that_is_a_file_is_explained(tmp_path: Path, recipe: Recipe) -> N
 def test_who_goes_on_for_a_killed_publisher_has_all_on_disk_before_the_record_is_linked(
     store: Store, recipe: Recipe, filled: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class Killed(BaseException):
-        pass
-
-    def kill(step: str) -> None:
-        if step == "renamed":
-            raise Killed
-
-    monkeypatch.setattr(publish, "discard", lambda draft: None)
-    monkeypatch.setattr(publish, "STEP_HOOK", kill)
-    draft = store.begin(recipe, {})
-    filled(draft)
-    with pytest.raises(Killed):
-        draft.publish(1, {})
+    draft = killed_once_renamed(store, recipe, filled, monkeypatch)
     synced: list[set[int]] = [set()]
     real = os.fsync
 

@@ -78,6 +78,11 @@ def test_pixels_between_two_answers_are_interpolated(step: Literal[2, 4]) -> Non
     assert np.abs(few[0, step + 1] - every[0, step] - (few[0, 2 * step] - few[0, step]) / step) <= 1e-4
 
 
+def test_every_fourth_pixel_upside_down_is_refused() -> None:
+    with pytest.raises(StageError, match="exclude each other"):
+        padded_log_odds(random_net(), random_layers(105, 109), flipped=True, step=4)
+
+
 def test_looking_upside_down_too_is_the_mean_of_the_log_odds() -> None:
     net, layers = random_net(), random_layers(5, 7)
     one, other = confidence(net, layers), confidence(net, layers[:, ::-1])[::-1]
