@@ -200,10 +200,13 @@ def _print_rows(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -> 
     for row in rows:
         table.add_row(*_cells(row, by_threshold), *([escape(_swept(row))] if swept else []))
     console = results()
-    print_table(table, console, _SPARE)
+    thresholds = {row["threshold_px"] for row in rows}
+    alike = len(thresholds) == 1  # then the line below tells it
+    print_table(table, console, (*_SPARE, "threshold px") if alike else _SPARE)
     kinds = ", ".join(sorted(set(masks.values())))
+    wrong = f"wrong above {thresholds.pop():g} px; " if alike else ""
     console.print(
-        f"mask: nonocc ({kinds}); bad and errors are of reported pixels, raw bad counts unreported ones as wrong; "
+        f"mask: nonocc ({kinds}); {wrong}bad and errors are of reported pixels, raw bad counts unreported ones as wrong; "
         "thresholds in pixels of the image at hand",
         style="dim",
         highlight=False,

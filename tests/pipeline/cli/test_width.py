@@ -41,6 +41,8 @@ def test_a_sweep(trained: Result, terminal: io.StringIO) -> None:
     shown = terminal.getvalue()
     assert "…" not in shown
     assert max(map(len, shown.splitlines())) <= printing.results().width
+    assert "\n\n" not in shown, "settings and figures must stand side by side"
+    assert "wrong above 1 px" in " ".join(shown.split())
     assert all(mode in "".join(shown.split()) for mode in ("mode=fast", "mode=guided"))
     for row in trained.metrics:
         if row["mask"] == "nonocc" and row["threshold_px"] == 1:
