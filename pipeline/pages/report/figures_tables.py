@@ -7,7 +7,7 @@ from semidense.pipeline.comparison.rows import Row
 from semidense.pipeline.pages.html import Html, folded, table, tag
 from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, mean_name, mean_rows, with_means
 
-_COLUMNS = ("pixels", "raw_bad", "bad", "invalid", "avgerr", "rms")
+_COLUMNS = ("raw_bad", "bad", "invalid", "avgerr", "rms", "pixels")
 
 
 def metrics_tables(rows: Sequence[Row], kept: str) -> Html:

@@ -120,11 +120,11 @@ def told_pixel(pixel: tuple[int, int], values: Mapping[str, float], curve: CostC
     y, x = pixel
     parts = [f"y = {y}, x = {x}"]
     raw, truth = values.get("disparity", np.nan), values.get("truth", np.nan)
-    parts.append(f"raw disparity {raw:.4g} px" if np.isfinite(raw) else "no raw disparity")
+    parts.append(f"raw disparity {raw:.2f} px" if np.isfinite(raw) else "no raw disparity")
     if "truth" in values:
-        parts.append(f"truth {truth:.4g} px" if np.isfinite(truth) else "truth unknown")
+        parts.append(f"truth {truth:.2f} px" if np.isfinite(truth) else "truth unknown")
     if np.isfinite(raw) and np.isfinite(truth):
-        parts.append(f"error {abs(raw - truth):.3g} px")
+        parts.append(f"error {abs(raw - truth):.2f} px")
     if "confidence" in values:
         parts.append(f"confidence {values['confidence']:.3f}")
     if curve and curve.winner is not None and curve.runner_up is not None:
