@@ -181,8 +181,8 @@ def test_a_pixel_can_be_named_by_its_place(seen: Seen, small: Running) -> None:
 
 def test_two_configurations_meet_at_the_line(seen: Seen, small: Running) -> None:
     options = seen.page.evaluate(f"{model('compare')}.options")
-    assert len(options) == 3
-    seen.page.evaluate(f"{model('compare')}.value = {options[2]!r}")
+    assert len(options) == 2
+    seen.page.evaluate(f"{model('compare')}.value = {options[1]!r}")
     seen.page.wait_for_function(f"{model('swiped-data')}.data.disparity[0].length > 1")
     seen.page.evaluate(f"{model('show')}.active = 3; {model('swipe')}.value = 40")
     shown = array(seen, "swiped-data", "confidence").reshape(SIZE)

@@ -57,7 +57,7 @@ def show_patches(
         if np.isfinite(disparity):
             left, right = matching_patches(channels, y, x, disparity)
             rows = rows or [("left", left)]
-            rows.append((f"{what}, {disparity:.4g} px", right))
+            rows.append((f"{what}, {disparity:.2f} px", right))
     panels.patches.visible = bool(rows)
     placed = [(row, column) for row in range(len(rows)) for column in range(len(use))]
     low, high = _spans([patch for _, patch in rows])

@@ -104,22 +104,21 @@ class Session:
     def choose_scene(self) -> None:
         """Offer the configurations of the scene, and show the latest."""
         scene = self._scene()
-        names = [each.name for each in scene.configurations] if scene else []
-        self._offer(self.controls.configuration, names)
-        self._offer(self.controls.compare, [NOTHING, *names])
+        self._offer(self.controls.configuration, [each.name for each in scene.configurations] if scene else [])
         self.choose_configuration()
 
     def choose_configuration(self) -> None:
-        """Read the maps of the configuration, and show them."""
-        self.chosen = self._configuration(self.controls.configuration.value)
+        """Read the maps of the configuration, show them, and offer the others to compare it with."""
+        compare, chosen = self.controls.compare, self.controls.configuration
+        others = [NOTHING, *(each for each in chosen.options if each != chosen.value)]
+        self._offer(compare, others, compare.value if compare.value in others else NOTHING)
+        compare.visible = len(others) > 1
+        self.chosen = self._configuration(chosen.value)
         self._opened = {}
         self.maps = self._read(self.chosen)
         if self.maps is None or self.chosen is None:
             if not self.panels.problem.text:
-                self._explain(
-                    f"nothing to look at is cached in {self.store.root}: make something with `pipeline match` or "
-                    "`pipeline run`"
-                )
+                self._explain(f"no map is in {self.store.root}: make something with `pipeline match` or `pipeline run`")
             return
         self._show_maps(self.maps)
         self.panels.products.text = provenance_table(self.chosen, self.store)

@@ -90,14 +90,21 @@ def _first(session: Session, scene: str) -> str:
 def test_a_second_configuration_is_offered_and_shown(made: Handmade) -> None:
     judge(made, np.full((60, 90), 0.25, np.float32), 1)
     session = build(Document(), made.store)
-    first, second = session.controls.compare.options[1:]
+    first, second = session.controls.configuration.options
+    assert session.controls.compare.options == [NOTHING, second], "a configuration beside itself tells nothing"
     assert session.controls.compare.value == NOTHING
+    assert session.controls.compare.visible
     session.controls.compare.value = second
     assert session.panels.swiped.box.visible
     assert session.sources.other.data["confidence"][0].max() > 0.25
     session.controls.configuration.value = second
     assert session.sources.base.data["confidence"][0].max() > 0.25
-    assert first
+    assert session.controls.compare.options == [NOTHING, first]
+    assert not session.panels.swiped.box.visible
+
+
+def test_a_single_configuration_has_nothing_to_be_compared_with(session: Session) -> None:
+    assert not session.controls.compare.visible, "it would do nothing"
 
 
 def test_an_entry_that_vanished_is_one_line(made: Handmade) -> None:
