@@ -228,6 +228,7 @@ def _text(box: Box, found: Sequence[Ancestor]) -> str:
 
 def _settings(params: Mapping[str, object]) -> str:
     """Return the settings of a product as lines of a box: as many as fit; what is read has none."""
-    told = [f"{name} {value_text(value)}" for name, value in params.items() if name not in _NO_SETTINGS]
+    given = {name: value for name, value in params.items() if name not in _NO_SETTINGS and value is not None}
+    told = [f"{name} {value_text(value)}" for name, value in given.items()]
     lines = wrap(", ".join(told), _LETTERS, max_lines=_LINES, placeholder=" ...")
     return "".join(f"\n{line}" for line in lines)

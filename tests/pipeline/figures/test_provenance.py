@@ -28,3 +28,10 @@ def test_boxes_do_not_overlap(trained: Result) -> None:
     assert not any(one.overlaps(other) for n, one in enumerate(boxes) for other in boxes[:n])
     assert all(figure.bbox.fully_containsx(x) for box in boxes for x in (box.x0, box.x1))
     assert all(figure.bbox.fully_containsy(y) for box in boxes for y in (box.y0, box.y1))
+
+
+def test_a_setting_that_is_not_given_is_left_out(trained: Result) -> None:
+    figure = draw_graph(ancestry(trained.store, trained.find("metrics").key), PIXELS)
+    told = [text.get_text() for text in figure.axes[0].texts]
+    assert any("R 0." in each and "calibrated false" in each for each in told)
+    assert not any("null" in each for each in told)
