@@ -206,8 +206,8 @@ def _print_rows(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -> 
     kinds = ", ".join(sorted(set(masks.values())))
     wrong = f"wrong above {thresholds.pop():g} px; " if alike else ""
     console.print(
-        f"mask: nonocc ({kinds}); {wrong}bad and errors are of reported pixels, raw bad counts unreported ones as wrong; "
-        "thresholds in pixels of the image at hand",
+        f"mask: nonocc ({kinds}); {wrong}bad and errors are of reported pixels, "
+        "raw bad counts unreported ones as wrong; thresholds in pixels of the image at hand",
         style="dim",
         highlight=False,
     )

@@ -15,6 +15,8 @@ _USES = {
     for preset, settings in PRESETS.items()
 }
 """The stages that a preset exchanges: product -> stage."""
+_MADE = {stage: product for uses in _USES.values() for product, stage in uses.items()}
+"""The product that such a stage makes."""
 _UNSAID = ("tiles", "mode")
 """Parameters that are no setting, or said already."""
 _SHOWN = 3
@@ -44,7 +46,8 @@ def _told(settings: Mapping[str, str], names: Sequence[str]) -> list[str]:
 
 def _in_all(setting: str, chains: Sequence[Chain]) -> bool:
     """Return whether all configurations have the product of a setting."""
-    return all(setting.partition(".")[0] in chain for chain in chains)
+    stage = setting.partition(".")[0]
+    return all(_MADE.get(stage, stage) in chain for chain in chains)
 
 
 def _head(chain: Chain, settings: list[str]) -> str:
@@ -86,14 +89,15 @@ def _recorded(stage: str, params: Mapping[str, Any]) -> int:
 
 
 def _chosen(chain: Chain) -> Iterator[tuple[str, str]]:
-    """Yield the settings that are not the defaults, as text."""
+    """Yield the settings that are not the defaults, as text; each is named as ``--set`` takes it."""
     for product, entry in chain.items():
         if product in ("images", "truth"):
             continue
-        defaults = _defaults(_stage(product, entry.recipe.params)) if product in STAGES else {}
+        stage = _stage(product, entry.recipe.params) if product in STAGES else product
+        defaults = _defaults(stage) if product in STAGES else {}
         for name, value in entry.recipe.params.items():
             if name not in _UNSAID and defaults.get(name, PydanticUndefined) != value:
-                yield f"{product}.{name}", value_text(value)
+                yield f"{stage}.{name}", value_text(value)
 
 
 def _defaults(stage: str) -> dict[str, Any]:

@@ -35,7 +35,7 @@ def test_preset_and_mode_come_first_and_the_time_last() -> None:
 
 def test_a_setting_that_differs_is_told() -> None:
     wider = ROBUST | {"disparity": entry("aggregated", paths=16)}
-    assert shown(ROBUST, wider) == ["robust, fast", "robust, fast, disparity.paths=16"]
+    assert shown(ROBUST, wider) == ["robust, fast", "robust, fast, aggregated.paths=16"]
     assert shown(wider, wider) == ["robust, fast", "robust, fast"], "what all share sets none apart"
 
 
