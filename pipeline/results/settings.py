@@ -1,6 +1,7 @@
 """The non-default settings that an entry was made with, as a short text."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from pydantic_core import to_jsonable_python
 
@@ -8,10 +9,28 @@ from semidense.cache import Entry
 from semidense.cache.entries.index import Index, inputs_of
 from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.environment import former_version
+from semidense.pipeline.plan.presets import PRESETS
 from semidense.pipeline.results.text import value_text
+from semidense.stages.catalog import STAGES
 from semidense.stages.evaluation.filtering import SemidenseParams
 
 DEFAULTS = "defaults"
+USES = {
+    preset: dict(each.removeprefix("use.").split("=") for each in settings if each.startswith("use."))
+    for preset, settings in PRESETS.items()
+}
+"""The stages that a preset exchanges: product -> stage."""
+
+
+def stage_of(product: str, params: Mapping[str, Any]) -> str:
+    """Return the stage of a preset that made a product: the one with the most of its settings in the record."""
+    candidates = [product, *(uses[product] for uses in USES.values() if product in uses)]
+    return max(candidates, key=lambda name: _recorded(name, params)) if len(candidates) > 1 else product
+
+
+def _recorded(stage: str, params: Mapping[str, Any]) -> int:
+    fields = set(STAGES[stage].params.model_fields)
+    return len(fields) if fields <= set(params) else -1
 
 
 def filter_text(params: SemidenseParams) -> str:
@@ -54,7 +73,11 @@ class Settings:
 
 def _own(entry: Entry) -> Iterable[str]:
     """Yield the entry's own settings that were chosen; what a run fills in by itself has an open default."""
-    defaults = to_jsonable_python(dict(Config.load().section(entry.recipe.stage)))  # those that no key has, too
-    for name, value in entry.recipe.params.items():
+    product, params = entry.recipe.stage, entry.recipe.params
+    stage = stage_of(product, params)
+    if stage != product:
+        yield f"use.{product}={stage}"
+    defaults = to_jsonable_python(dict(Config.load().section(stage)))  # those that no key has, too
+    for name, value in params.items():
         if name in defaults and defaults[name] not in (None, "auto", value):
-            yield f"{entry.recipe.stage}.{name}={value_text(value)}"
+            yield f"{stage}.{name}={value_text(value)}"

@@ -6,17 +6,12 @@ from typing import Any
 from pydantic_core import PydanticUndefined, to_jsonable_python
 
 from semidense.cache import Entry
-from semidense.pipeline.plan.presets import PRESETS
+from semidense.pipeline.results.settings import USES, stage_of
 from semidense.pipeline.results.text import time_text, value_text
 from semidense.stages.catalog import STAGES
 
-_USES = {
-    preset: dict(each.removeprefix("use.").split("=") for each in settings if each.startswith("use."))
-    for preset, settings in PRESETS.items()
-}
-"""The stages that a preset exchanges: product -> stage."""
-_MADE = {stage: product for uses in _USES.values() for product, stage in uses.items()}
-"""The product that such a stage makes."""
+_MADE = {stage: product for uses in USES.values() for product, stage in uses.items()}
+"""The product that a preset's stage makes in the place of its own."""
 _UNSAID = ("tiles", "mode")
 """Parameters that are no setting, or said already."""
 _SHOWN = 3
@@ -68,24 +63,13 @@ def _when(chain: Chain) -> str:
 
 def _preset(chain: Chain) -> str:
     """Return the preset whose stages made a configuration; empty if there is none."""
-    made = {product: _stage(product, chain[product].recipe.params) for product in _exchanged() if product in chain}
-    fitting = [preset for preset, uses in _USES.items() if all(made[each] == uses.get(each, each) for each in made)]
+    made = {product: stage_of(product, chain[product].recipe.params) for product in _exchanged() if product in chain}
+    fitting = [preset for preset, uses in USES.items() if all(made[each] == uses.get(each, each) for each in made)]
     return next(iter(fitting), "")
 
 
 def _exchanged() -> list[str]:
-    return list(dict.fromkeys(product for uses in _USES.values() for product in uses))
-
-
-def _stage(product: str, params: Mapping[str, Any]) -> str:
-    """Return the stage of a preset that made a product: the one with the most of its settings in the record."""
-    candidates = [product, *(uses[product] for uses in _USES.values() if product in uses)]
-    return max(candidates, key=lambda name: _recorded(name, params))
-
-
-def _recorded(stage: str, params: Mapping[str, Any]) -> int:
-    fields = set(STAGES[stage].params.model_fields)
-    return len(fields) if fields <= set(params) else -1
+    return list(dict.fromkeys(product for uses in USES.values() for product in uses))
 
 
 def _chosen(chain: Chain) -> Iterator[tuple[str, str]]:
@@ -93,8 +77,8 @@ def _chosen(chain: Chain) -> Iterator[tuple[str, str]]:
     for product, entry in chain.items():
         if product in ("images", "truth"):
             continue
-        stage = _stage(product, entry.recipe.params) if product in STAGES else product
-        defaults = _defaults(stage) if product in STAGES else {}
+        stage = stage_of(product, entry.recipe.params)
+        defaults = _defaults(stage) if stage in STAGES else {}
         for name, value in entry.recipe.params.items():
             if name not in _UNSAID and defaults.get(name, PydanticUndefined) != value:
                 yield f"{stage}.{name}", value_text(value)

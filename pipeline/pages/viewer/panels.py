@@ -36,6 +36,7 @@ from semidense.pipeline.figures.colours import (
 LEGEND = """
 .scale, .key { white-space: nowrap; display: inline-flex; align-items: center; gap: .35rem; margin-right: .8rem; }
 .bar { display: inline-block; flex: none; height: .75rem; border-radius: .2rem; }
+.bar, .swatch { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
 .swatch { width: .8rem; height: .8rem; border: 1px solid var(--quiet); border-radius: .15rem; }
 :host { min-width: 0; max-width: 100%; overflow-x: auto; font: .82rem/1.4 system-ui, sans-serif; color: var(--quiet); }
 h3 { font-size: .95rem; margin: 0 0 .25rem; color: var(--ink); }

@@ -4,6 +4,7 @@ import pytest
 
 from semidense.cache import Recipe
 from semidense.pipeline.results.settings import DEFAULTS, Settings, filter_text
+from semidense.stages.catalog import STAGES
 from semidense.stages.evaluation.filtering import SemidenseParams
 
 
@@ -29,6 +30,19 @@ class Made:
 )
 def test_the_settings_that_are_not_the_defaults_are_named(params: dict[str, object], text: str) -> None:
     entry = Made(Recipe("costvolume", {}, params, {}, {}))
+    assert Settings([entry]).text(entry) == text  # type: ignore[list-item, arg-type]
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        pytest.param({}, "use.disparity=aggregated", id="its defaults, which differ from the other stage's"),
+        pytest.param({"paths": 16}, "aggregated.paths=16 use.disparity=aggregated", id="a setting of its own"),
+    ],
+)
+def test_a_stage_in_the_place_of_another_is_named_with_its_settings(changed: dict[str, int], text: str) -> None:
+    params = STAGES["aggregated"].params().model_dump(mode="json") | changed
+    entry = Made(Recipe("disparity", {}, params, {}, {}))
     assert Settings([entry]).text(entry) == text  # type: ignore[list-item, arg-type]
 
 
