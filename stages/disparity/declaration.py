@@ -44,6 +44,9 @@ class AggregatedParams(Params):
         6, ge=0, le=255, description="pixels whose gray differs by more levels of 255 have an edge between them"
     )
     edge_divisor: float = Field(8, ge=1, le=1000, description="both penalties are divided by it at an edge")
+    passes: Literal[1, 2] = Field(
+        1, description="2: sum once more, after the mean of its first path costs was added to the cost of each cell"
+    )
     subpixel: bool = Field(True, description="refine by a parabola through three summed costs")
 
     @model_validator(mode="after")

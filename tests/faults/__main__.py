@@ -34,15 +34,20 @@ def main() -> int:
             said = ", ".join(f"{name} {rows[-1][name]}" for name in total([]))
             print(f"row {row.number}: {said}; {rows[-1]['seconds']} s", file=sys.stderr, flush=True)
             print(*rows[-1]["notes"][:20], sep="\n", end="\n" if rows[-1]["notes"] else "", file=sys.stderr)
+            if options.json:  # after each row: a row takes up to forty minutes, and the next one may be interrupted
+                _write(options.json, rows)
     rows = _merged(options.json, rows)
     print(markdown(rows))
-    if options.json:
-        options.json.write_text(json.dumps({"name": "faults", "rows": rows, "total": total(rows)}, indent=1) + "\n")
     if options.quote:
         quote(rows)
     counts = total(rows)
     enough = numbers or options.scale < 1 or counts["injected"] >= PROMISED
     return 0 if enough and not any(count for name, count in counts.items() if name != "injected") else 1
+
+
+def _write(path: Path, rows: list[dict[str, Any]]) -> None:
+    every = _merged(path, rows)
+    path.write_text(json.dumps({"name": "faults", "rows": every, "total": total(every)}, indent=1) + "\n")
 
 
 def _merged(path: Path | None, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

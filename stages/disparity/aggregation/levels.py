@@ -59,6 +59,37 @@ def levels_of(costs: NDArray[Any], d_min: int) -> Levels:
     return made
 
 
+def with_mean(above: NDArray[np.int16], sums: NDArray[np.uint16], paths: int) -> NDArray[np.int16]:
+    """Return the costs of a second pass: each with the mean of its paths' costs added, above the pixel's least.
+
+    Args:
+        above: (y, x, d) costs of the first pass, in [0, CAP] levels.
+        sums: (y, x, d) their sums over all paths.
+        paths: how many paths were summed, a power of two.
+
+    Returns:
+        (y, x, d) int16 levels in [0, 2 * CAP]: the mean is rounded, a half up, and at most ``CAP``.
+    """
+    made = np.empty_like(above)
+    _add_mean(above, sums, paths.bit_length() - 1, made)
+    return made
+
+
+@kernel
+def _add_mean(above: NDArray[np.int16], sums: NDArray[np.uint16], shift: int, made: NDArray[np.int16]) -> None:
+    """Write the costs of a second pass; every number is as narrow as the sums, so that many are computed at once."""
+    height, width, depth = above.shape
+    half, bits = np.uint16(1 << shift >> 1), np.uint16(shift)
+    for y in range(height):
+        for x in range(width):
+            low = np.uint16(0xFFFF)
+            for d in range(depth):
+                low = min(low, sums[y, x, d])
+            for d in range(depth):
+                mean = np.uint16(np.uint16(np.uint16(sums[y, x, d] - low) + half) >> bits)
+                made[y, x, d] = np.int16(above[y, x, d] + np.int16(min(mean, np.uint16(CAP))))
+
+
 def _level_of_half() -> NDArray[np.int16]:
     """Return the level of each of the 65536 float16 numbers, by its bits."""
     values = np.arange(1 << 16, dtype=np.uint16).view(np.float16)

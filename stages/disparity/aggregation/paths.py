@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.disparity.aggregation.levels import SCALE, Levels
+from semidense.stages.disparity.aggregation.levels import SCALE
 from semidense.stages.disparity.declaration import AggregatedParams
 
 DOWN = np.array([(0, 1), (1, -1), (1, 0), (1, 1), (1, 2), (1, -2), (2, 1), (2, -1)])
@@ -58,7 +58,7 @@ class Front:
 
 
 def follow(
-    levels: Levels,
+    above: NDArray[np.int16],
     gray: NDArray[np.uint8],
     top: int,
     params: AggregatedParams,
@@ -70,9 +70,9 @@ def follow(
     """Follow the paths of one pass through some rows, and add their costs to ``sums``.
 
     Args:
-        levels: the rows' costs.
+        above: (y, x, d) int16 costs of the rows, levels above the pixel's least, at most ``2 * CAP``.
         gray: (y, x) uint8 of the whole image.
-        top: the row of the image that is the first of ``levels``.
+        top: the row of the image that is the first of ``above``.
         params: paths and penalties.
         front: of the rows before, which lie below when going upwards.
         sums: (y, x, d) int16, levels, modulo 2 ** 16; the path costs are added.
@@ -84,8 +84,8 @@ def follow(
     # One more row, which the first row is written to; afterwards the oldest row goes.
     costs, least = (np.concatenate([each, each[:, :1]], axis=1) for each in (front.costs, front.least))
     steps, table = steps_down(params), penalties(params)
-    _follow(levels.above, gray, top, steps, table, params.edge_step, costs, least, sums, upwards)
-    turn = -(len(levels.above) % costs.shape[1])
+    _follow(above, gray, top, steps, table, params.edge_step, costs, least, sums, upwards)
+    turn = -(len(above) % costs.shape[1])
     return Front(*(np.roll(each, turn, axis=1)[:, :-1].copy() for each in (costs, least)))
 
 

@@ -30,10 +30,21 @@ def _levels_of_pixel(costs: NDArray, x: int, width: int, d_min: int) -> list[int
 
 
 def sums(costs: NDArray, gray: NDArray, d_min: int, params: AggregatedParams) -> NDArray[np.int64]:
-    """Return the sum of all path costs, (y, x, d)."""
-    height, width, depth = costs.shape
+    """Return the sum of all path costs, (y, x, d); of the second pass, if there are two."""
     cost = levels(costs, d_min)
-    total = np.zeros(costs.shape, np.int64)
+    total = _sums(cost, costs.shape, gray, params)
+    if params.passes == 2:
+        half = params.paths // 2
+        mean = np.minimum((total - total.min(2, keepdims=True) + half) // params.paths, 320)
+        total = _sums((np.array(cost) + mean).tolist(), costs.shape, gray, params)
+    return total
+
+
+def _sums(
+    cost: list[list[list[int]]], shape: tuple[int, int, int], gray: NDArray, params: AggregatedParams
+) -> NDArray[np.int64]:
+    height, width, depth = shape
+    total = np.zeros(shape, np.int64)
     for dy, dx in SIXTEEN if params.paths == 16 else EIGHT:
 
         @cache

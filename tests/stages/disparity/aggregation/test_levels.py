@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from semidense.stages.disparity.aggregation.levels import NO_COST, levels_of
+from semidense.stages.disparity.aggregation.levels import CAP, NO_COST, levels_of, with_mean
 from semidense.stages.stage import StageError
 from tests.stages.disparity.aggregation.direct import levels
 
@@ -69,3 +69,16 @@ def test_every_float16_has_its_level() -> None:
 def test_what_is_no_volume_is_refused(costs: np.ndarray, message: str) -> None:
     with pytest.raises(StageError, match=message):
         levels_of(costs, 0)
+
+
+def test_a_second_pass_adds_the_mean_of_the_paths_above_the_least() -> None:
+    above = np.int16([[[0, 10, 320]]])
+    sums = np.uint16([[[100, 103, 104]]])
+    # Of 8 paths the means above the least are 0, 3 / 8 and a half, which is rounded up.
+    assert with_mean(above, sums, 8).tolist() == [[[0, 10, 321]]]
+    assert with_mean(above, sums * 100, 16).tolist() == [[[0, 29, 345]]]
+
+
+def test_a_second_pass_adds_at_most_the_largest_cost() -> None:
+    made = with_mean(np.int16([[[CAP, 0]]]), np.uint16([[[16 * (2 * CAP + 3200), 0]]]), 16)
+    assert made.tolist() == [[[2 * CAP, 0]]]

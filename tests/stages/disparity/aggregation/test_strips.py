@@ -46,6 +46,7 @@ def test_by_hand() -> None:
     assert aggregated(costs, gray, 0, params, 1)[0].tolist() == expected.tolist()
 
 
+@pytest.mark.parametrize("passes", [1, 2])
 @pytest.mark.parametrize("paths", [8, 16])
 @pytest.mark.parametrize(
     ("shape", "d_min"),
@@ -59,19 +60,20 @@ def test_by_hand() -> None:
         pytest.param((3, 2, 40), 0, id="more disparities than one vector holds"),
     ],
 )
-def test_as_the_equation_says(shape: tuple[int, int, int], d_min: int, paths: int) -> None:
+def test_as_the_equation_says(shape: tuple[int, int, int], d_min: int, paths: int, passes: int) -> None:
     costs, gray = pair(shape, d_min)
     for values in ({}, {"p1": 0.5, "p2": 0.5}, {"p1": 0, "p2": 0}, {"p1": 2.3, "p2": 9, "edge_divisor": 3.7}):
-        params = AggregatedParams(paths=paths, **values)
+        params = AggregatedParams(paths=paths, passes=passes, **values)
         assert np.array_equal(aggregated(costs, gray, d_min, params, 100), sums(costs, gray, d_min, params))
 
 
-def test_the_largest_costs_and_penalties_fit() -> None:
+@pytest.mark.parametrize("passes", [1, 2])
+def test_the_largest_costs_and_penalties_fit(passes: int) -> None:
     """Sums of 16 paths at the largest penalties stay exact."""
     rng = np.random.default_rng(0)
     costs = rng.choice(np.float16([-np.inf, -65504, 0, 65504, np.inf]), (6, 7, 4))
     gray = np.zeros((6, 7), np.uint8)
-    params = AggregatedParams(paths=16, p1=400, p2=400)
+    params = AggregatedParams(paths=16, p1=400, p2=400, passes=passes)
     finite = np.clip(costs, -2000, 2000)  # a difference of more than 40 is 40
     assert np.array_equal(aggregated(costs, gray, -3, params, 2), sums(finite, gray, -3, params))
 
@@ -81,12 +83,15 @@ def test_the_largest_costs_and_penalties_fit() -> None:
     st.integers(-5, 5),
     st.integers(1, 12),
     st.sampled_from([8, 16]),
+    st.sampled_from([1, 2]),
     st.integers(0, 9),
 )
-@settings(max_examples=60, deadline=None)
-def test_however_it_is_cut(shape: tuple[int, int, int], d_min: int, rows: int, paths: int, seed: int) -> None:
+@settings(max_examples=100, deadline=None)
+def test_however_it_is_cut(
+    shape: tuple[int, int, int], d_min: int, rows: int, paths: int, passes: int, seed: int
+) -> None:
     costs, gray = pair(shape, d_min, seed)
-    params = AggregatedParams(paths=paths, p1=2, p2=7)
+    params = AggregatedParams(paths=paths, p1=2, p2=7, passes=passes)
     assert np.array_equal(
         aggregated(costs, gray, d_min, params, rows), aggregated(costs, gray, d_min, params, shape[0])
     )
@@ -104,16 +109,20 @@ class Watched:
 
 
 @pytest.mark.parametrize(
-    ("rows", "expected"),
+    ("passes", "rows", "expected"),
     [
-        pytest.param(10, [(0, 10)], id="one strip is read once"),
-        pytest.param(4, [(0, 4), (4, 8), (8, 10), (4, 8), (0, 4)], id="down, then up"),
+        pytest.param(1, 10, [(0, 10)], id="one strip is read once"),
+        pytest.param(1, 4, [(0, 4), (4, 8), (8, 10), (4, 8), (0, 4)], id="down, then up"),
+        pytest.param(2, 10, [(0, 10)], id="one strip is read once for two passes, too"),
+        pytest.param(
+            2, 4, [(8, 10), (4, 8), (0, 4), (4, 8), (8, 10), (4, 8), (0, 4)], id="up, down, and up once more"
+        ),
     ],
 )
-def test_never_more_than_a_strip_is_read(rows: int, expected: Sequence[tuple[int, int]]) -> None:
+def test_never_more_than_a_strip_is_read(passes: int, rows: int, expected: Sequence[tuple[int, int]]) -> None:
     costs, gray = pair((10, 5, 4))
     volume = Watched(costs)
-    strips = [strip.rows for strip in aggregate(volume, gray, 0, AggregatedParams(), rows)]
+    strips = [strip.rows for strip in aggregate(volume, gray, 0, AggregatedParams(passes=passes), rows)]
     assert volume.read == list(expected)
     assert [strip.start for strip in strips] == sorted({start for start, _ in expected}, reverse=True)
 
@@ -128,20 +137,27 @@ class Endless:
         return self.rows[np.arange(rows.start, rows.stop) % len(self.rows)]
 
 
-def test_memory_holds_a_strip_and_the_paths_between_strips() -> None:
-    """Of 1024 rows, some 3 x 32 are held in strips, and 4 for each of 32 strips between them."""
+@pytest.mark.parametrize(
+    ("passes", "share"),
+    [
+        pytest.param(1, 0.35, id="some 3 x 32 of 1024 rows in strips, and 4 for each of 32 strips between them"),
+        pytest.param(2, 0.8, id="some 6 x 32 in strips, and 12 for each strip between them"),
+    ],
+)
+def test_memory_holds_a_strip_and_the_paths_between_strips(passes: int, share: float) -> None:
     costs, _ = pair((32, 60, 40))
     volume = Endless(costs, 1024)
     gray = np.zeros(volume.shape[:2], np.uint8)
-    next(aggregate(volume, gray, 0, AggregatedParams(), 32))  # compiles
+    params = AggregatedParams(passes=passes)
+    next(aggregate(volume, gray, 0, params, 32))  # compiles
     tracemalloc.start()
     try:
-        for _ in aggregate(volume, gray, 0, AggregatedParams(), 32):
+        for _ in aggregate(volume, gray, 0, params, 32):
             pass
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert peak < 0.35 * 1024 * 60 * 40 * costs.itemsize
+    assert peak < share * 1024 * 60 * 40 * costs.itemsize
 
 
 @pytest.mark.parametrize("width", [1, 100, 3000, 100_000])
