@@ -66,6 +66,9 @@ def _targets(builder: "_Builder", trained_on: Sequence[Mapping[str, Any]]) -> It
     if upto in STAGES and STAGES[upto].scope == "split":
         yield builder.product(upto, None)
         return
+    if builder.config.training.held_out:
+        yield from builder.held_out(upto)
+        return
     for scene in builder.request.dataset.scenes:
         if trained_on and scene.image_identity() in trained_on:
             notes.append(f"{scene.name} is a training scene: it is left out, since nothing is tested on it")
@@ -117,6 +120,19 @@ class _Builder:
         if asked not in self.known:
             self.known[asked] = self._add_product(product, scene)
         return self.known[asked]
+
+    def held_out(self, product: str) -> Iterator[str]:
+        """Add a product of each training scene that was asked for, made by networks that have not seen it.
+
+        Raises:
+            UsageError: if nothing is trained.
+        """
+        if not self.request.train:
+            raise UsageError("training.held_out judges the training scenes by networks of other scenes: add --train")
+        asked = {(scene.dataset, scene.name) for scene in self.request.dataset.scenes}
+        for scene in self._mapped():
+            if (scene.dataset, scene.name) in asked:
+                yield self._not_having_seen(scene).product(product, scene)
 
     def _add_product(self, product: str, scene: SceneSource | None) -> str:
         if scene and (source := source_of(product, scene)):

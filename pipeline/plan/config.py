@@ -51,6 +51,10 @@ class TrainingParams(Params):
     cross_fit: bool = Field(
         False, description="learn from maps that networks made which have not seen the scene: as wrong as new maps"
     )
+    held_out: bool = Field(
+        False,
+        description="judge the training scenes themselves, each by networks that have not seen it; needs --train",
+    )
 
 
 class Config(BaseModel):

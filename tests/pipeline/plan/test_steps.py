@@ -127,6 +127,33 @@ def test_the_maps_that_are_learnt_from_can_be_fewer_than_the_scenes_of_the_costs
     assert learnt == {f"train-{number}" for number in range(6)}
 
 
+def test_held_out_scenes_are_judged_by_networks_that_have_not_seen_them() -> None:
+    made = graph(*PRESETS["robust"], "training.held_out=true", train=True)
+    judged = [made.steps[target] for target, _ in made.targets]
+    assert [(step.product, step.scene) for step in judged] == [("metrics", "train-0"), ("metrics", "train-1")]
+    for step in judged:
+        inputs = [made.steps[each] for each in behind(made, step.id)]
+        (costs,) = (each for each in inputs if each.product == "costvolume" and each.scene == step.scene)
+        assert seen_by(made, costs.inputs["descriptor_net"][0]) == {"train-0", "train-1"} - {step.scene}
+        (confidence,) = (each for each in inputs if each.product == "confidence" and each.scene == step.scene)
+        for net, learnt_from in (("evaluation_net", "images"), ("evidence_net", "evidence_samples")):
+            learnt = made.steps[confidence.inputs[net][0]].inputs[learnt_from]
+            assert {made.steps[each].scene for each in learnt} == {"train-0", "train-1"} - {step.scene}
+
+
+def test_held_out_scenes_are_those_whose_maps_are_learnt_from_and_that_were_asked_for() -> None:
+    many = open_dataset("synthetic:train=6,test=1,height=64,width=80,disparities=8")
+    config = Config.load(None, ["training.held_out=true", "training.maps=3"])
+    asked = many.select(["train-1", "train-2", "test-0"])
+    made = build(Request(asked, {"": config}, "disparity", True, training_scenes(many)))
+    assert [made.steps[target].scene for target, _ in made.targets] == ["train-1"]
+
+
+def test_scenes_are_held_out_of_a_training_only() -> None:
+    with pytest.raises(UsageError, match=r"training\.held_out judges .* add --train"):
+        graph("training.held_out=true")
+
+
 def test_a_calibration_takes_the_cross_fitted_maps_of_the_evidence() -> None:
     made = graph(*PRESETS["robust"], upto="calibration", train=True)
     ((target, _),) = made.targets
