@@ -91,7 +91,9 @@ def in_threads(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
 
     with ThreadPoolExecutor(THREADS) as pool:
         try:
-            for thread in [pool.submit(work) for _ in range(min(THREADS, len(items)))]:
+            threads = [pool.submit(work) for _ in range(min(THREADS, len(items)) - 1)]
+            work()
+            for thread in threads:
                 thread.result()
         finally:
             waiting.appendleft(None)
@@ -250,15 +252,6 @@ def walk(folder: Path) -> Iterator[tuple[str, os.DirEntry[str]]]:
                 yield (path := prefix + thing.name), thing
                 if thing.is_dir(follow_symlinks=False):
                     waiting.append(path + "/")
-
-
-def walk_folders(folder: Path) -> Iterator[Path]:
-    """Yield ``folder`` and the folders below it, inner ones first; links are not followed."""
-    with os.scandir(folder) as things:
-        inner = [Path(thing.path) for thing in things if thing.is_dir(follow_symlinks=False)]
-    for each in inner:
-        yield from walk_folders(each)
-    yield folder
 
 
 def move_folder(source: Path, target: Path) -> None:
