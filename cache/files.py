@@ -13,7 +13,7 @@ import stat
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
@@ -46,18 +46,14 @@ _ADVICE = {
 }
 
 
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
+def writing(path: Path) -> AbstractContextManager[None]:
     """Turn a failure of the file system under ``path`` into ``CacheUnavailable``, one line with advice."""
-    with _explaining(path, "write to"):
-        yield
+    return _explaining(path, "write to")
 
 
-@contextmanager
-def reading(path: Path) -> Iterator[None]:
+def reading(path: Path) -> AbstractContextManager[None]:
     """Turn a failure of the file system under ``path`` into ``CacheUnavailable``, one line with advice."""
-    with _explaining(path, "read"):
-        yield
+    return _explaining(path, "read")
 
 
 @contextmanager
