@@ -36,7 +36,7 @@ def plain(value: object) -> Json:
     if isinstance(value, (dict, Mapping)):  # a dict is known at once, a Mapping is asked for
         return plain_mapping("value", value)
     if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
+        return [item if type(item) in _AS_THEY_ARE else plain(item) for item in value]
     raise InvalidRecipe(f"{value!r} is a {type(value).__name__}: convert it to a plain str, int, float, bool or list")
 
 
@@ -48,7 +48,7 @@ def _finite(value: float) -> float:
 
 
 def plain_mapping(name: str, value: object) -> dict[str, Any]:
-    """Return a mapping as a dict of plain JSON types.
+    """Return a mapping as a dict of plain JSON types, in the order in which files have its keys.
 
     Raises:
         InvalidRecipe: naming it, if it is not a mapping or holds what JSON cannot.
@@ -57,8 +57,8 @@ def plain_mapping(name: str, value: object) -> dict[str, Any]:
         raise InvalidRecipe(f"{name} must be a mapping, not {value!r}")
     if not set(map(type, value)) <= _TEXT:
         _refuse_keys(value)
-    # Most items are texts: a call for each would take most of the time in which a plan reads a cache.
-    return {key: item if type(item) is str else plain(item) for key, item in value.items()}
+    # Most items stay as they are: a call for each would take most of the time in which a plan reads a cache.
+    return {key: item if type(item := value[key]) in _AS_THEY_ARE else plain(item) for key in sorted(value)}
 
 
 def _refuse_keys(value: Mapping[Any, Any]) -> NoReturn:
@@ -169,7 +169,12 @@ class Documents(Generic[D]):
 
 def seal(kind: str, content: Mapping[str, Any]) -> bytes:
     """Return the file of a document: its content, kind, format and checksum, readable."""
-    return _sealed({**plain_mapping(kind, content), "kind": kind, "format": FORMAT_VERSION})
+    return seal_plain(kind, plain_mapping(kind, content))
+
+
+def seal_plain(kind: str, content: dict[str, Any]) -> bytes:
+    """As ``seal``, of what is plain already: a record has hundreds of values."""
+    return _sealed({**content, "kind": kind, "format": FORMAT_VERSION})
 
 
 def _sealed(body: dict[str, Any]) -> bytes:
@@ -179,33 +184,35 @@ def _sealed(body: dict[str, Any]) -> bytes:
 def laid_out(value: Json, line: str = "\n") -> str:
     """Return plain JSON a value a line, as ``json.dumps(value, indent=1, sort_keys=True)`` does, but much faster.
 
-    A plan reads thousands of documents, and compares each with how it would be written. Most values are texts, and
-    of the others most are whole numbers: each is spelled at once, without Python's encoder.
+    A plan reads thousands of documents, and compares each with how it would be written. What is no list and no dict is
+    spelled at once, without Python's encoder.
 
     Args:
         value: as ``plain`` returns it.
         line: the line break and the indent of the value's last line.
     """
-    kind = type(value)
-    if kind is str:
-        return _quoted(value)  # type: ignore[arg-type]
-    if kind is int:
-        return repr(value)
-    if not value or kind not in _NESTED:
-        return _spelled(value)
+    if spell := _SCALARS.get(type(value)):
+        return spell(value)
     inner = f"{line} "
     if isinstance(value, dict):
         parts = [
-            f"{_quoted(name)}: {_quoted(item) if type(item) is str else laid_out(item, inner)}"
+            f"{_quoted(name)}: {spell(item) if (spell := _SCALARS.get(type(item))) else laid_out(item, inner)}"
             for name, item in sorted(value.items())
         ]
-        return f"{{{inner}{f',{inner}'.join(parts)}{line}}}"
-    texts = [_quoted(item) if type(item) is str else laid_out(item, inner) for item in value]  # type: ignore[union-attr]
-    return f"[{inner}{f',{inner}'.join(texts)}{line}]"
+        return f"{{{inner}{f',{inner}'.join(parts)}{line}}}" if value else "{}"
+    items: list[Json] = value  # type: ignore[assignment]
+    texts = [spell(item) if (spell := _SCALARS.get(type(item))) else laid_out(item, inner) for item in items]
+    return f"[{inner}{f',{inner}'.join(texts)}{line}]" if value else "[]"
 
 
-_NESTED = frozenset((dict, list))
 _quoted = json.encoder.encode_basestring_ascii
+_SCALARS: Mapping[type, Callable[[Any], str]] = {
+    str: _quoted,
+    int: repr,
+    float: repr,
+    bool: {False: "false", True: "true"}.__getitem__,
+    type(None): lambda _: "null",
+}
 
 
 def unseal(kind: str, data: bytes) -> dict[str, Any]:

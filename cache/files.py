@@ -13,7 +13,7 @@ import stat
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
@@ -46,18 +46,14 @@ _ADVICE = {
 }
 
 
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
+def writing(path: Path) -> AbstractContextManager[None]:
     """Turn a failure of the file system under ``path`` into ``CacheUnavailable``, one line with advice."""
-    with _explaining(path, "write to"):
-        yield
+    return _explaining(path, "write to")
 
 
-@contextmanager
-def reading(path: Path) -> Iterator[None]:
+def reading(path: Path) -> AbstractContextManager[None]:
     """Turn a failure of the file system under ``path`` into ``CacheUnavailable``, one line with advice."""
-    with _explaining(path, "read"):
-        yield
+    return _explaining(path, "read")
 
 
 @contextmanager
@@ -91,7 +87,9 @@ def in_threads(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
 
     with ThreadPoolExecutor(THREADS) as pool:
         try:
-            for thread in [pool.submit(work) for _ in range(min(THREADS, len(items)))]:
+            threads = [pool.submit(work) for _ in range(min(THREADS, len(items)) - 1)]
+            work()
+            for thread in threads:
                 thread.result()
         finally:
             waiting.appendleft(None)
@@ -250,15 +248,6 @@ def walk(folder: Path) -> Iterator[tuple[str, os.DirEntry[str]]]:
                 yield (path := prefix + thing.name), thing
                 if thing.is_dir(follow_symlinks=False):
                     waiting.append(path + "/")
-
-
-def walk_folders(folder: Path) -> Iterator[Path]:
-    """Yield ``folder`` and the folders below it, inner ones first; links are not followed."""
-    with os.scandir(folder) as things:
-        inner = [Path(thing.path) for thing in things if thing.is_dir(follow_symlinks=False)]
-    for each in inner:
-        yield from walk_folders(each)
-    yield folder
 
 
 def move_folder(source: Path, target: Path) -> None:

@@ -34,6 +34,9 @@ _FORMS = {
     "checkpoints": re.compile(r"[0-9a-f]{64}|\.[0-9a-f]{64}\..*", re.ASCII),
 }
 """How the things in each folder are named. What has another name is not the cache's, and stays."""
+_FOLDERS = ("records", "entries", "drafts", "quarantine", "locks", "leases")
+_LATER = ("sources", "checkpoints")
+"""Folders that are made when they are needed."""
 _TAG_NAME = "CACHEDIR.TAG"
 _TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# This folder is a cache: all in it can be made again.\n"
 
@@ -157,15 +160,27 @@ class Layout:
             CacheUnavailable: if they cannot be made, or the folder holds files and is not a cache.
         """
         with writing(self.root):
+            if self._is_whole():
+                return
             if not (is_folder(self.root / "leases") and self._is_tagged()):
                 if not self.root.is_dir():  # which may be a link: the user's own choice
                     make_folder(self.root)
                 self.require_cache()
                 self._write_tag()
-            for folder in ("records", "entries", "drafts", "quarantine", "locks", "leases"):
+            for folder in _FOLDERS:
                 make_folder(self.root / folder)
-            for folder in ("sources", "checkpoints"):  # made when they are needed
+            for folder in _LATER:
                 require_no_link(self.root / folder)
+
+    def _is_whole(self) -> bool:
+        """Return whether the tag and all folders are there, none of them a link; asked often, so at one go."""
+        try:
+            with os.scandir(self.root) as things:
+                folders = {thing.name: thing.is_dir(follow_symlinks=False) for thing in things}
+        except (FileNotFoundError, NotADirectoryError):
+            return False
+        there = all(folders.get(name, False) for name in _FOLDERS) and all(folders.get(name, True) for name in _LATER)
+        return there and self._is_tagged()
 
     def _is_tagged(self) -> bool:
         tag = self.root / _TAG_NAME

@@ -3,14 +3,13 @@
 Both are read strictly: what does not have exactly the written form is damaged.
 """
 
-import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Self
 
-from semidense.cache.document import Json, digest_of_plain, plain_mapping, seal, unseal
+from semidense.cache.document import Json, digest_of_plain, plain_mapping, seal_plain, unseal
 from semidense.cache.errors import CacheError, DamagedEntry, InvalidRecipe
 from semidense.cache.keys.recipe import Recipe, require_texts
 
@@ -47,6 +46,16 @@ def require_sha256(name: str, value: object) -> None:
         raise ValueError(f"{name} is not a sha256: {value!r}")
 
 
+def folders_of(paths: Iterable[str]) -> frozenset[str]:
+    """Return the folders that some files are in, and theirs."""
+    found: set[str] = set()
+    for path in paths:
+        folder = path
+        while (folder := folder.rpartition("/")[0]) and folder not in found:
+            found.add(folder)
+    return frozenset(found)
+
+
 @dataclass(frozen=True)
 class Manifest:
     """Every file of an entry, sorted by path; all that is read of an entry is read through it.
@@ -69,12 +78,7 @@ class Manifest:
     @property
     def folders(self) -> frozenset[str]:
         """The folders that the files are in, and theirs."""
-        found: set[str] = set()
-        for file in self.files:
-            folder = file.path
-            while (folder := folder.rpartition("/")[0]) and folder not in found:
-                found.add(folder)
-        return frozenset(found)
+        return folders_of(file.path for file in self.files)
 
     @property
     def size(self) -> int:
@@ -87,7 +91,7 @@ class Manifest:
 
     def to_bytes(self) -> bytes:
         """Return the manifest's file."""
-        return seal("manifest", {"files": self._rows()})
+        return seal_plain("manifest", {"files": self._rows()})
 
     @classmethod
     def from_bytes(cls, data: bytes) -> Self:
@@ -156,7 +160,8 @@ class Entry:
 
     def to_bytes(self) -> bytes:
         """Return the record's file."""
-        return seal("entry", {name: getattr(self, name) for name in _NAMES} | {"recipe": self.recipe.to_dict()})
+        content = {name: getattr(self, name) for name in _NAMES} | {"recipe": self.recipe.to_dict()}
+        return seal_plain("entry", content)
 
     @classmethod
     def from_bytes(cls, key: str, data: bytes) -> Self:
@@ -170,18 +175,9 @@ class Entry:
             require_sha256("its digest", content["digest"])
             if content["key"] != key:
                 raise ValueError(f"it is the record of {content['key']!r}")
-            return cls._from_content(content)
+            return cls(**{**content, "recipe": Recipe.from_dict(content["recipe"])})
         except (ValueError, CacheError, RecursionError) as error:
             raise DamagedEntry(f"the record of {key} is damaged: {error}") from None
-
-    def as_read(self, data: bytes) -> Self:
-        """Return what ``from_bytes`` does, its mappings in the same order, given what ``to_bytes`` just returned."""
-        content = json.loads(data)
-        return self._from_content({name: content[name] for name in _NAMES})
-
-    @classmethod
-    def _from_content(cls, content: Mapping[str, Any]) -> Self:
-        return cls(**{**content, "recipe": Recipe.from_dict(content["recipe"])})
 
 
 _NAMES: Sequence[str] = tuple(Entry.__dataclass_fields__)

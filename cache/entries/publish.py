@@ -23,7 +23,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from semidense.cache.entries.check import MANIFESTS, RECORDS, inspect, inspect_data, read_plain
-from semidense.cache.entries.entry import MANIFEST, Entry, File, Manifest
+from semidense.cache.entries.entry import MANIFEST, Entry, File, Manifest, folders_of
 from semidense.cache.entries.quarantine import move_anything, set_aside
 from semidense.cache.errors import DamagedEntry, EntryNotFound, NonDeterministicStage
 from semidense.cache.files import (
@@ -36,7 +36,6 @@ from semidense.cache.files import (
     shared_out,
     sync,
     walk,
-    walk_folders,
     write_new,
     writing,
 )
@@ -66,13 +65,11 @@ STEP_HOOK: Callable[[str], None] = lambda _: None  # noqa: E731 - replaced by te
 
 def remove_strays(folder: Path, expected: Iterable[str]) -> None:
     """Delete what a killed writer left in a draft, such as a half-written temporary file or an empty folder."""
-    wanted = set(expected)
+    files = set(expected)
+    folders = folders_of(files)
     for path, thing in list(walk(folder)):
-        if path not in wanted and not thing.is_dir(follow_symlinks=False):
+        if path not in (folders if thing.is_dir(follow_symlinks=False) else files):
             remove(folder / path)
-    for each in walk_folders(folder):
-        with suppress(OSError):
-            each.rmdir()  # only of an empty folder does this succeed
 
 
 def seal(draft: Path, paths: Iterable[str]) -> Manifest:
@@ -203,7 +200,7 @@ def _write_record(draft: Path, entry: Entry) -> None:
     remove(_record_beside(draft))
     data = entry.to_bytes()
     write_new(_record_beside(draft), data)
-    RECORDS.keep(entry.as_read(data), data, entry.key)
+    RECORDS.keep(entry, data, entry.key)
     STEP_HOOK("record written")
 
 

@@ -19,7 +19,7 @@ from semidense.pipeline.plan.errors import StageFailed, StageRefused, told_of_st
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.steps import Step
 from semidense.stages.compute.allocator import keep_freed_memory
-from semidense.stages.stage import Array
+from semidense.stages.stage import Array, Output
 
 Span = tuple[float, float]
 """When work began and ended, in seconds since the epoch."""
@@ -32,7 +32,7 @@ LARGE = MOST_BYTES // 4
 
 
 class Recent:
-    """The products read last by one process in one run; sent to another process, it arrives empty."""
+    """The products read last, or made, by one process in one run; sent to another process, it arrives empty."""
 
     def __init__(self) -> None:
         self._kept: OrderedDict[str, dict[str, Labelled]] = OrderedDict()
@@ -71,11 +71,11 @@ class Recent:
         from semidense.cache.entries.reader import values_of
 
         found = {name: Labelled(values_of(array), found[name].dims) for name, array in arrays.items()}
-        self._keep(key, found)
+        self.keep(key, found)
         return found
 
-    def _keep(self, key: str, arrays: dict[str, Labelled]) -> None:
-        """Keep a product, and drop those that were not read for longest."""
+    def keep(self, key: str, arrays: dict[str, Labelled]) -> None:
+        """Keep a small product, whose arrays nobody changes, and drop those that were not used for longest."""
         with self._lock:
             self._size += _bytes(arrays) - _bytes(self._kept.get(key, {}))
             self._kept[key] = arrays
@@ -118,7 +118,7 @@ class Context:
         watch: told how it goes on.
         extras: stored beside each result.
         claims: who makes what.
-        recent: what was read last.
+        recent: what was read last, or made.
         runner: hashes of the code that carries out tasks, for workers to prove theirs; None in the planning process.
     """
 
@@ -155,12 +155,19 @@ class Job:
         inputs: keys of the entries it is made from, by product.
         draft: where it is written; None if an equal result was there already.
         made: the result that was there already, else None.
+        arrays: takes what is made where the same task goes on with it; None where another may, for no array travels.
     """
 
     step: Step
     inputs: Mapping[str, tuple[str, ...]]
     draft: Draft | None
     made: Made | None
+    arrays: dict[str, Labelled] | None = None
+
+    def hand_on(self, output: Output, array: Array) -> None:
+        """Take a copy of a whole array that was written, laid out as it is when it is read."""
+        if self.arrays is not None:
+            self.arrays[output.name] = Labelled(np.array(array, order="C"), output.dims)
 
 
 def flat(results: Iterable[Made | Sequence[Made]]) -> list[Made]:

@@ -8,6 +8,7 @@ another worker too: it finds the draft that was begun, the tile that was written
 import time
 from collections.abc import Container, Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 from semidense.cache import (
@@ -53,12 +54,17 @@ def make_all(
 
 def _make(context: Context, step: Step, inputs: Sequence[Made], forced: bool) -> Made:
     job = begin(context, step, inputs, forced, step.tiles)
+    if step.tiles == 1 and context.runner is None:  # on a cluster another worker may have written a part of the draft
+        job = replace(job, arrays={})
     if step.stage.tile_rows is None or step.size is None:
-        return publish(context, job, [make_whole(context, job)])
-    job = create_arrays(job)
-    return publish(
-        context, job, [make_tile(context, job, rows) for rows in cut_rows(step.size[0], step.stage.tile_rows)]
-    )
+        spans = [make_whole(context, job)]
+    else:
+        job = create_arrays(job)
+        spans = [make_tile(context, job, rows) for rows in cut_rows(step.size[0], step.stage.tile_rows)]
+    made = publish(context, job, spans)
+    if job.arrays:
+        context.recent.keep(made.key, job.arrays)
+    return made
 
 
 def begin(context: Context, step: Step, inputs: Sequence[Made | Sequence[Made]], forced: bool, tiles: int) -> Job:
@@ -117,7 +123,7 @@ def make_tile(context: Context, job: Job, rows: Rows) -> Span | None:
             return None
         made = _compute_tile(context, job, rows)
         for output in step.stage.outputs:
-            _write_tile(job.draft, output, made[output.name], rows)
+            _write_tile(job, job.draft, output, made[output.name], rows)
     context.watch.advanced(step, 1, step.tiles, "")
     return begun, time.time()
 
@@ -180,6 +186,7 @@ def make_whole(context: Context, job: Job) -> Span | None:
             array = made[output.name].astype(output.dtype or made[output.name].dtype, copy=False)
             _create(job.draft, output, array.shape, str(array.dtype), None)
             job.draft.write(output.name, tuple(slice(0, length) for length in array.shape), array)
+            job.hand_on(output, array)
     context.watch.advanced(step, 1, 1, "")
     return begun, time.time()
 
@@ -271,10 +278,12 @@ def _create(draft: Draft, output: Output, shape: Sequence[int], dtype: str, tile
     draft.create_array(output.name, shape, dtype, [max(1, chunk) for chunk in chunks], output.dims, attrs)
 
 
-def _write_tile(draft: Draft, output: Output, array: Array, rows: Rows) -> None:
+def _write_tile(job: Job, draft: Draft, output: Output, array: Array, rows: Rows) -> None:
     """Write a tile's part of one array."""
     if _has_part(output, rows):
-        draft.write(output.name, _region(output, rows), array.astype(output.dtype, copy=False))
+        part = array.astype(output.dtype, copy=False)
+        draft.write(output.name, _region(output, rows), part)
+        job.hand_on(output, part)
 
 
 def _has_part(output: Output, rows: Rows) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from semidense.cache import Store
 from semidense.cache.document import seal, unseal
-from semidense.cache.files import walk, walk_folders
+from semidense.cache.files import walk
 
 Damage = Callable[[Path, Path], object]
 """Does something to an entry's folder and record."""
@@ -29,7 +29,9 @@ def files_of(store: Store, key: str) -> dict[str, Path]:
 
 def unlock(store: Store, key: str) -> None:
     """Make an entry's folders writable, so that files in them can be removed by whoever is not root."""
-    for folder in [*walk_folders(store.layout.entry(key)), store.layout.record(key).parent]:
+    entry = store.layout.entry(key)
+    inner = [entry / path for path, thing in walk(entry) if thing.is_dir(follow_symlinks=False)]
+    for folder in (entry, *inner, store.layout.record(key).parent):
         folder.chmod(0o755)
 
 

@@ -1,6 +1,10 @@
 """Small stages whose results can be checked by hand, and graphs of them: the runner's tests need no networks."""
 
+import os
+import signal
+import tempfile
 import threading
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -67,6 +71,20 @@ def fail_below(_: Any, inputs: Inputs) -> Arrays:  # noqa: ANN401
 
 def refuse(_: Any, inputs: Inputs) -> Arrays:  # noqa: ANN401
     raise StageError("these values are no good")
+
+
+def note_and_ramp(folder: str, inputs: Inputs) -> Arrays:
+    """Leave a file for each call, in whichever process it is."""
+    os.close(tempfile.mkstemp(dir=folder)[0])
+    return make_ramp(0, inputs)
+
+
+def die_once(marker: str, inputs: Inputs) -> Arrays:
+    """Kill the process, unless a call before did so."""
+    if not Path(marker).exists():
+        Path(marker).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return make_sum(marker, inputs)
 
 
 def train_toy(_: Any, inputs: Inputs, monitor: Any) -> Arrays:  # noqa: ANN401

@@ -11,14 +11,15 @@ import pytest
 from semidense.cache import Store, code_parts
 from semidense.pipeline import api
 from semidense.pipeline.api import Task
+from semidense.pipeline.execution.graph import MANY, batches
 from semidense.pipeline.execution.scheduler import execute
 from semidense.pipeline.execution.watch import Unwatched
 from semidense.pipeline.plan.errors import StageFailed, StageRefused
-from semidense.pipeline.plan.plan import Made
-from semidense.pipeline.plan.steps import Graph
+from semidense.pipeline.plan.plan import Made, Plan
+from semidense.pipeline.plan.steps import Graph, Step
 from semidense.pipeline.results.opening import open_product
 from semidense.pipeline.results.result import Result
-from tests.pipeline.toy import BLURRED, chain
+from tests.pipeline.toy import BLURRED, RAMP, SUM, Offset, chain, graph, step
 from tests.tiny import TRAINED
 
 
@@ -59,14 +60,42 @@ def test_the_command_line_finds_the_scheduler(scheduler: str, invoke: Callable[.
     assert ran.out.splitlines()[-1] == "reused 25 products, made 1 semidense, 1 metrics"
 
 
-def run(graph: Graph, store: Store, scheduler: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, Made]:
+def planned(graph: Graph, store: Store, monkeypatch: pytest.MonkeyPatch) -> Plan:
     from semidense.pipeline.plan import plan as planning
 
     code = code_parts("tests.pipeline.toy", ("tests",))
     proven = Graph({each.id: replace(each, code=code) for each in graph.steps.values()}, graph.targets)
     monkeypatch.setattr(planning, "build", lambda _: proven)
     request: Any = None
-    return execute(planning.make_plan(request, store), store, Unwatched(), {}, scheduler)
+    return planning.make_plan(request, store)
+
+
+def run(graph: Graph, store: Store, scheduler: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, Made]:
+    return execute(planned(graph, store, monkeypatch), store, Unwatched(), {}, scheduler)
+
+
+def test_a_worker_that_is_killed_in_a_batch_costs_no_product_that_it_published(
+    scheduler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = [tmp_path / str(number) for number in range(MANY)]
+    noted = replace(RAMP, compute="tests.pipeline.toy:note_and_ramp")
+    deadly = replace(SUM, compute="tests.pipeline.toy:die_once")
+    steps: list[Step] = []
+    for number, folder in enumerate(calls):
+        folder.mkdir()
+        ramp = step(noted, str(folder), scene=f"Toy {number}")
+        blurred = step(BLURRED, Offset(reach=1, offset=number), scene=ramp.scene, ramp=ramp)
+        last = step(deadly if number == 3 else SUM, str(tmp_path / "killed"), scene=ramp.scene, blurred=blurred)
+        steps += [ramp, blurred, last]
+    store, many = Store(tmp_path / "shared"), graph(*steps)
+    plan = planned(many, store, monkeypatch)
+    assert [len(each) for each in batches(plan.todo())] == [3] * MANY
+    made = execute(plan, store, Unwatched(), {}, scheduler)
+    assert (tmp_path / "killed").exists()
+    assert [len(list(folder.iterdir())) for folder in calls] == [1] * MANY, "what it had published is not made again"
+    assert list(store.layout.drafts.iterdir()) == []
+    on_threads = execute(plan, Store(tmp_path / "threads"), Unwatched(), {})
+    assert [each.digest for each in made.values()] == [each.digest for each in on_threads.values()]
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from semidense.cache import Store
@@ -118,6 +119,40 @@ def test_a_batch_whose_worker_died_goes_on_where_that_stopped(
     assert tuple(each.step for each in made) == steps
     assert not any(each.reused for each in made)
     assert list(context.store.layout.drafts.iterdir()) == []
+
+
+def test_a_batch_reads_nothing_again_that_it_just_made(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened, real = [], Store.arrays
+    monkeypatch.setattr(Store, "arrays", lambda self, key: opened.append(key) or real(self, key))
+    tasks.make_all(context, scene(1, replace(BLURRED, tile_rows=16)), [], frozenset())
+    assert opened == []
+    ramp, blurred, _ = tasks.make_all(context, scene(2), [], frozenset())
+    assert opened == [blurred.key], "of several tiles no one holds the whole"
+    assert context.recent.open(context.store, ramp.key)["values"].dims == ("y", "x")
+    for key in (ramp.key, blurred.key):
+        kept, read = context.recent.read(context.store, key), context.store.read(key)
+        assert {name: (each.tobytes(), each.strides) for name, each in kept.items()} == {
+            name: (each.tobytes(), each.strides) for name, each in read.items()
+        }
+
+
+def test_on_a_cluster_a_batch_reads_what_was_published(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker that was given up may have written into the same draft."""
+    monkeypatch.setattr(Context, "admit", lambda *_: None)
+    with store.lease() as lease:
+        context = Context(store, Unwatched(), {}, Claims(lease), runner={})
+        made = tasks.make_all(context, scene(1), [], frozenset())
+    assert list(context.recent._kept) == [made[0].key, made[1].key], "each of them by reading"
+
+
+def test_what_is_handed_on_is_a_copy_as_it_would_be_read() -> None:
+    job, array = Job(scene(1)[0], {}, None, None, arrays={}), np.arange(6.0).reshape(2, 3).T
+    job.hand_on(RAMP.outputs[0], array)
+    array[:] = 0
+    assert job.arrays is not None
+    values = job.arrays["values"].values
+    assert values[...].tolist() == [[0, 3], [1, 4], [2, 5]]
+    assert isinstance(values, np.ndarray) and values.flags.c_contiguous
 
 
 def test_a_batch_ends_with_its_run(store: Store) -> None:
