@@ -100,7 +100,7 @@ def _search(
 ) -> None:
     """Write what ``Found`` tells. Of equal correlations the one in the first row counts, there the first column."""
     rows, count = other_sums.shape
-    columns = np.empty(count + SIDE - 1)
+    columns, twos, fours = np.empty(count + SIDE - 1), np.empty(count + SIDE), np.empty(count + SIDE)
     scores = np.empty(count)
     along = np.full((2 * count - 1, count), -1.0)  # shift, x: the largest of all rows
     back_score, back_x = np.full((rows, count), -np.inf), np.zeros((rows, count), np.int64)
@@ -109,16 +109,8 @@ def _search(
             first, width = max(0, shift), count - abs(shift)
             at = slice(first, first + width)
             there = slice(first - shift, first - shift + width)
-            columns[:] = 0
-            for k in range(SIDE):
-                one, other = own[k, first:], others[row + k, first - shift :]
-                for x in range(width + SIDE - 1):
-                    columns[x] += one[x] * other[x]
-            total = columns[: SIDE - 1].sum()
-            for x in range(width):
-                total += columns[x + SIDE - 1]
-                scores[x] = total
-                total -= columns[x]
+            _multiply(own, others, row, first, first - shift, columns[: width + SIDE - 1])
+            _sum_beside(columns[: width + SIDE - 1], twos, fours, scores)
             _normalise(scores, own_sums[at], other_sums[row, there], own_inverse[at], other_inverse[row, there])
             _keep_best(scores, row, first, shift, best[at], best_row[at], best_column[at])
             _keep_back(scores, first, back_score[row, there], back_x[row, there])
@@ -131,6 +123,30 @@ def _search(
         for x in range(count):
             if abs(shift - (x - best_column[x])) > BESIDE:
                 rival[x] = max(rival[x], along[shift + count - 1, x])
+
+
+@kernel
+def _multiply(own: _Floats, others: _Floats, row: int, x: int, column: int, columns: _Floats) -> None:
+    """Write the sum of products of each column of two strips, from ``x`` and ``column`` on."""
+    one, other = own[0, x:], others[row, column:]
+    for i in range(len(columns)):
+        columns[i] = one[i] * other[i]
+    for k in range(1, SIDE, 2):  # two rows at a time take fewer stores
+        one, other = own[k, x:], others[row + k, column:]
+        two, another = own[k + 1, x:], others[row + k + 1, column:]
+        for i in range(len(columns)):
+            columns[i] += one[i] * other[i] + two[i] * another[i]
+
+
+@kernel
+def _sum_beside(columns: _Floats, twos: _Floats, fours: _Floats, sums: _Floats) -> None:
+    """Write the sums of thirteen columns side by side, by those of two and of four: a running sum takes no vectors."""
+    for x in range(len(columns) - 1):
+        twos[x] = columns[x] + columns[x + 1]
+    for x in range(len(columns) - 3):
+        fours[x] = twos[x] + twos[x + 2]
+    for x in range(len(columns) - 12):
+        sums[x] = fours[x] + fours[x + 4] + fours[x + 8] + columns[x + 12]
 
 
 @kernel
