@@ -74,8 +74,19 @@ def search(left: Patches, right: Patches, y: int, reach: int) -> Found:
         np.full(count, -np.inf), np.zeros(count, int), np.zeros(count, int), np.zeros(count, int), np.full(count, -1.0)
     )
     own, others = (_inverse(lengths) for lengths in (left.lengths[y], right.lengths[top:end]))
-    strips = left.values[y : y + SIDE], right.values[top : end + SIDE - 1]
-    _search(*strips, left.sums[y], right.sums[top:end], own, others, *found)
+    _search(
+        left.values[y : y + SIDE],
+        right.values[top : end + SIDE - 1],
+        left.sums[y],
+        right.sums[top:end],
+        own,
+        others,
+        found.score,
+        found.row,
+        found.column,
+        found.back,
+        found.rival,
+    )
     return found._replace(row=found.row + top)
 
 
