@@ -23,6 +23,7 @@ from semidense.cache.keys.imported import Stamp, process_start, stamp_of
 from semidense.cache.keys.trees import (
     is_for_checkers,
     literal_import,
+    may_import_by_call,
     parsed,
     running,
     source_hash,
@@ -182,7 +183,8 @@ def _read(module: _Module) -> _Source:
     try:
         stamp, data = stamp_of(file), file.read_bytes()
         tree = parsed(data)
-        imports, hashed = frozenset(_imports(tree, module)), tree_hash(without_docstrings(tree))
+        imports = frozenset(_imports(tree, module, may_import_by_call(data)))
+        hashed = tree_hash(without_docstrings(tree))
     except (OSError, SyntaxError, ValueError, RecursionError) as error:
         raise SourceNotFound(f"cannot read the source {module.file}: {error}") from error
     if is_imported:
@@ -196,9 +198,9 @@ def _edited(file: Path) -> str:
     return f"{file} was edited since this Python began, and may have been imported before: restart Python (the kernel)"
 
 
-def _imports(tree: ast.AST, module: _Module) -> Iterator[str]:
+def _imports(tree: ast.AST, module: _Module, by_call: bool) -> Iterator[str]:
     """Yield each dotted name that might be a module imported here; names of other things do no harm."""
-    for node in running(tree):
+    for node in running(tree, by_call):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield from (alias.name, *_offered(alias.name).values())

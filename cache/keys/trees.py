@@ -59,14 +59,19 @@ class _Bare(ast.NodeTransformer):
         return None if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str) else node
 
 
-def running(tree: ast.AST) -> Iterator[ast.AST]:
-    """Yield the nodes of a tree that may run: not what is there for type checkers alone."""
+def running(tree: ast.AST, expressions: bool) -> Iterator[ast.AST]:
+    """Yield the nodes of a tree that may run: not what is there for type checkers alone.
+
+    Args:
+        tree: a module's.
+        expressions: with those too, which are most of a tree. No expression holds a statement.
+    """
     waiting = list(ast.iter_child_nodes(tree))
     while waiting:
         node = waiting.pop()
         if is_for_checkers(node):
             waiting += node.orelse
-        else:
+        elif expressions or not isinstance(node, ast.expr):
             yield node
             waiting += ast.iter_child_nodes(node)
 
@@ -75,6 +80,11 @@ def is_for_checkers(node: ast.AST) -> TypeGuard[ast.If]:
     """Return whether a statement is ``if TYPE_CHECKING``, which never runs."""
     test = node.test if isinstance(node, ast.If) else None
     return getattr(test, "attr", getattr(test, "id", None)) == "TYPE_CHECKING"
+
+
+def may_import_by_call(text: bytes) -> bool:
+    """Return whether a source may have a ``literal_import``: its text says so, or writes names in other characters."""
+    return not text.isascii() or b"import_module" in text or b"__import__" in text
 
 
 def literal_import(call: ast.Call) -> str | None:

@@ -1,9 +1,8 @@
 """Small pictures in the terminal, where it can show them: two pixels a character, in full colour."""
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from rich.color import Color
 from rich.console import Console
@@ -12,6 +11,9 @@ from rich.style import Style
 
 from semidense.pipeline.figures.colours import confidence_rgb, disparity_rgb, disparity_span, view_rgb
 from semidense.pipeline.pages.scene_maps import step_for
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 COLUMNS, ROWS = 72, 24
 """Characters that a picture takes at most."""
@@ -75,7 +77,7 @@ class Small(NamedTuple):
     legend: str
 
 
-def small_picture(product: str, dataset: xr.Dataset) -> Small | None:
+def small_picture(product: str, dataset: "xr.Dataset") -> Small | None:
     """Return a small picture of a product; None for one that is no map of a scene.
 
     Args:

@@ -22,8 +22,6 @@ REACH = 8
 ENOUGH = 100
 """Matches below which nothing is said of the pair."""
 _ROWS = 24
-_RADIUS = 6
-_SIDE = 2 * _RADIUS + 1
 _GOOD = 0.8
 _UNIQUE = 0.05
 _CONTRAST = 2.0
@@ -65,18 +63,21 @@ def survey(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> Survey:
         The matches and the range. Views smaller than a patch, or without texture, have no matches.
     """
     step = max(1, -(-max(left.shape) // LONGEST))
-    views = shrink(left, step), shrink(right, step)
-    rows = [_row_matches(*views, y) for y in _rows(views[0].shape[0])] if min(views[0].shape) >= _SIDE else []
+    rows = _matches(_square_sums(left, step), _square_sums(right, step), _CONTRAST * step**2)
     matches = np.concatenate([np.empty((0, len(FIELDS)), np.float32), *rows]) * np.float32(step)
     return Survey(matches.astype(np.float32), estimate_range(matches, step, left.shape[1]), step)
 
 
 def shrink(view: NDArray[np.uint8], step: int) -> _Floats:
     """Return the means of squares of ``step`` x ``step`` px; what is left over at the right and below is cut off."""
+    return (_square_sums(view, step) / step**2).astype(np.float32)
+
+
+def _square_sums(view: NDArray[np.uint8], step: int) -> NDArray[np.float64]:
     height, width = (length // step for length in view.shape)
     squares = view[: height * step, : width * step].reshape(height, step, width, step)
-    means: _Floats = squares.mean(axis=(1, 3), dtype=np.float32)
-    return means
+    sums: NDArray[np.float64] = squares.sum(axis=(1, 3), dtype=np.float64)
+    return sums
 
 
 def estimate_range(matches: Array, step: int, width: int) -> _Floats:
@@ -121,45 +122,29 @@ def _is_common(disparity: Array, row: Array, value: float, step: int) -> bool:
     return bool(near.sum() >= max(8, _SUPPORT * disparity.size) and np.unique(row[near]).size >= 3)
 
 
-def _rows(height: int) -> Iterator[int]:
-    """Yield the first row of each patch that is looked at."""
-    count = min(_ROWS, height - _SIDE + 1)
-    yield from dict.fromkeys(np.linspace(0, height - _SIDE, count).astype(int).tolist())
+def _matches(left: NDArray[np.float64], right: NDArray[np.float64], contrast: float) -> Iterator[_Floats]:
+    """Yield the matches of each row of patches that is looked at, (match, field), px of the shrunken views.
 
+    Args:
+        left: (y, x) whole numbers.
+        right: of the same size.
+        contrast: least standard deviation of a patch.
+    """
+    from semidense.stages.disparity import patch_search  # with Numba, which a plan does without
 
-def _row_matches(left: _Floats, right: _Floats, y: int) -> _Floats:
-    """Return the matches of the patches whose first row is ``y``, (match, field), px of the shrunken views."""
-    own, contrast = _patches(left[y : y + _SIDE])
-    top = max(0, y - REACH)
-    others, _ = _patches(right[top : y + REACH + _SIDE])
-    scores = (own[0] @ others.reshape(-1, _SIDE * _SIDE).T).reshape(own.shape[1], *others.shape[:2])  # x, row, x right
-    found = scores.reshape(len(scores), -1).argmax(axis=1)
-    row, column = np.divmod(found, others.shape[1])
-    good = (contrast[0] > _CONTRAST) & _is_clear(scores, row, column)
-    x = np.arange(len(scores))
-    chosen = np.nonzero(good & _agreed(good, x - column, row))[0]
-    places = [np.full(chosen.size, y + _RADIUS), chosen + _RADIUS, (x - column)[chosen], (row + top - y)[chosen]]
-    return np.stack(places, axis=1).astype(np.float32)
-
-
-def _patches(strip: _Floats) -> tuple[_Floats, _Floats]:
-    """Return all patches of a strip with mean 0 and length 1, (row, x, pixel), and their deviations, (row, x)."""
-    patches = np.lib.stride_tricks.sliding_window_view(strip, (_SIDE, _SIDE))
-    flat = patches.reshape(*patches.shape[:2], -1)
-    centred = flat - flat.mean(axis=2, keepdims=True)
-    length = np.sqrt((centred * centred).sum(axis=2))
-    return centred / np.maximum(length, 1e-6)[..., np.newaxis], length / _SIDE
-
-
-def _is_clear(scores: _Floats, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Return whether each patch's best place is good, has it as its own best, and no rival along the row."""
-    x = np.arange(len(scores))
-    best = scores[x, row, column]
-    back = scores[:, row, column].argmax(axis=0)
-    along = scores.max(axis=1)  # x, x right
-    along[np.abs(np.arange(along.shape[1]) - column[:, np.newaxis]) <= 2] = -1
-    clear: NDArray[np.bool_] = (best > _GOOD) & (np.abs(back - x) <= 1) & (along.max(axis=1) < best - _UNIQUE)
-    return clear
+    if min(left.shape) < patch_search.SIDE:
+        return
+    views = patch_search.patches_of(left), patch_search.patches_of(right)
+    height, width = views[0].sums.shape
+    x = np.arange(width)
+    for y in dict.fromkeys(np.linspace(0, height - 1, min(_ROWS, height)).astype(int).tolist()):
+        found = patch_search.search(*views, y, REACH)
+        clear = (found.score > _GOOD) & (np.abs(found.back - x) <= 1) & (found.rival < found.score - _UNIQUE)
+        good = clear & (views[0].lengths[y] > contrast * patch_search.AREA)
+        moved = x - found.column
+        chosen = np.nonzero(good & _agreed(good, moved, found.row))[0]
+        middle = np.stack([np.full(chosen.size, y), chosen]) + patch_search.RADIUS
+        yield np.stack([*middle, moved[chosen], found.row[chosen] - y], axis=1).astype(np.float32)
 
 
 def _agreed(good: NDArray[np.bool_], disparity: NDArray[np.intp], row: NDArray[np.intp]) -> NDArray[np.bool_]:

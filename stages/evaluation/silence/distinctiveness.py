@@ -91,11 +91,13 @@ def _least_difference(values: NDArray[np.int32], window: int, reach: int, least:
     for shift in range(NEAREST_REPETITION, min(reach, width - window) + 1):
         columns = np.zeros(width - shift, np.int32)
         for y in range(height):
-            for x in range(width - shift):
-                columns[x] += abs(values[y, x] - values[y, x + shift])
+            row, beside = values[y], values[y, shift:]  # an index that is known to be in the array takes vectors
+            for x in range(len(columns)):
+                columns[x] += abs(row[x] - beside[x])
             if y >= window:
-                for x in range(width - shift):
-                    columns[x] -= abs(values[y - window, x] - values[y - window, x + shift])
+                row, beside = values[y - window], values[y - window, shift:]
+                for x in range(len(columns)):
+                    columns[x] -= abs(row[x] - beside[x])
             if y >= window - 1:
                 _write_least(columns, window, shift, least[y - window + 1])
 
@@ -103,14 +105,15 @@ def _least_difference(values: NDArray[np.int32], window: int, reach: int, least:
 @kernel
 def _write_least(columns: NDArray[np.int32], window: int, shift: int, least: NDArray[np.int32]) -> None:
     """Sum columns to windows; each sum is that of two windows, ``shift`` apart."""
-    total = np.int32(0)
-    for x in range(len(columns)):
-        total += columns[x]
-        first = x - window + 1
-        if first >= 0:
-            least[first] = min(least[first], total)
-            least[first + shift] = min(least[first + shift], total)
-            total -= columns[first]
+    sums = np.empty(len(columns) - window + 1, np.int32)
+    total = columns[: window - 1].sum()
+    for x in range(len(sums)):
+        total += columns[x + window - 1]
+        sums[x] = total
+        total -= columns[x]
+    for at in (least, least[shift:]):
+        for x in range(len(sums)):
+            at[x] = min(at[x], sums[x])
 
 
 def compute_distinctiveness(params: DistinctivenessParams, inputs: OfImages) -> Distinctiveness:
