@@ -44,11 +44,13 @@ class Strip:
         rows: which rows of the image.
         single: their costs before aggregation.
         aggregated: (y, x, d) uint16: the sum of the costs of all paths, levels; of the second pass, if there are two.
+        first: the same of the first pass.
     """
 
     rows: slice
     single: Levels
     aggregated: NDArray[np.uint16]
+    first: NDArray[np.uint16]
 
 
 def aggregate(
@@ -93,7 +95,7 @@ class _Image:
         for rows in reversed(strips):
             levels = self._levels(rows)
             sums, _, below = self._sums(rows, levels.above, fronts.pop(), below)
-            yield Strip(rows, levels, sums)
+            yield Strip(rows, levels, sums, sums)
 
     def summed_twice(self, strips: Sequence[slice]) -> Iterator[Strip]:
         """Yield the sums of a second pass, the last strip first."""
@@ -110,10 +112,10 @@ class _Image:
         last = self._beginning()
         for rows, front in zip(reversed(strips), below, strict=True):
             levels = self._levels(rows)
-            sums, _, _ = self._sums(rows, levels.above, above.pop(), front)
-            costs = with_mean(levels.above, sums, self.params.paths)
+            first, _, _ = self._sums(rows, levels.above, above.pop(), front)
+            costs = with_mean(levels.above, first, self.params.paths)
             sums, _, last = self._sums(rows, costs, again.pop(), last)
-            yield Strip(rows, levels, sums)
+            yield Strip(rows, levels, sums, first)
 
     def _beginning(self) -> Front:
         return Front.beginning(steps_down(self.params), *self.volume.shape[1:])

@@ -30,13 +30,14 @@ def winner(strip: Strip) -> NDArray[np.int32]:
 def parabola(strip: Strip, index: NDArray[np.int32]) -> NDArray[np.float32]:
     """Return how far the lowest point of the parabola through the winner and its neighbours lies from it.
 
-    ``(S(d - 1) - S(d + 1)) / (2 (S(d - 1) - 2 S(d) + S(d + 1)))`` of the aggregated costs ``S``.
+    ``(S(d - 1) - S(d + 1)) / (2 (S(d - 1) - 2 S(d) + S(d + 1)))`` of the sums ``S`` of the first pass: those of a second
+    one lean more on the neighbours, so their lowest point lies further from the pixel's own.
 
     Returns:
         (y, x) float32 in [-0.5, 0.5] px; 0 at an end of the range or of the image, and where the three do not bend.
     """
     shift = np.zeros(index.shape, np.float32)
-    _shift(strip.aggregated, index, strip.single.d_min, shift)
+    _shift(strip.first, index, strip.single.d_min, shift)
     return shift
 
 
@@ -65,19 +66,19 @@ def _least(aggregated: NDArray[np.uint16], least: NDArray[np.int16], d_min: int,
 
 
 @kernel
-def _shift(aggregated: NDArray[np.uint16], index: NDArray[np.int32], d_min: int, shift: NDArray[np.float32]) -> None:
+def _shift(sums: NDArray[np.uint16], index: NDArray[np.int32], d_min: int, shift: NDArray[np.float32]) -> None:
     """Write the shift of each pixel that has a winner with two neighbours."""
-    height, width, depth = aggregated.shape
+    height, width, depth = sums.shape
     for y in range(height):
         for x in range(width):
             first, end = ends(x, width, d_min, depth)
             d = index[y, x]
             if first < d < end - 1:
                 before, here, after = (
-                    np.int64(aggregated[y, x, d - 1]),
-                    np.int64(aggregated[y, x, d]),
-                    np.int64(aggregated[y, x, d + 1]),
+                    np.int64(sums[y, x, d - 1]),
+                    np.int64(sums[y, x, d]),
+                    np.int64(sums[y, x, d + 1]),
                 )
                 bend = before - 2 * here + after
-                if bend > 0:  # the winner is the least, so the lowest point is at most half a pixel away
-                    shift[y, x] = (before - after) / (2 * bend)
+                if bend > 0:  # the winner of a second pass may not be the least of the first one
+                    shift[y, x] = min(max((before - after) / (2 * bend), -0.5), 0.5)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ def strip(sums: list[list[int]], d_min: int = 0, least: int = 0) -> Strip:
     """Return a row of pixels with these aggregated costs."""
     aggregated = np.array([sums], np.uint16)
     single = Levels(np.zeros(aggregated.shape, np.int16), np.full(aggregated.shape[:2], least, np.int16), d_min)
-    return Strip(slice(0, 1), single, aggregated)
+    return Strip(slice(0, 1), single, aggregated, aggregated)
 
 
 @pytest.mark.parametrize(
@@ -53,3 +55,11 @@ def test_the_parabola_by_hand(sums: list[int], index: int, expected: float) -> N
 
 def test_the_parabola_needs_neighbours_in_the_image() -> None:
     assert parabola(strip([[4, 0, 12]] * 9), np.full((1, 9), 1, np.int32))[0, :3].tolist() == [0, 0, -0.25]
+
+
+def test_the_parabola_goes_through_the_sums_of_the_first_pass() -> None:
+    twice = replace(strip([[9, 9, 0, 9, 9]] * 9), first=strip([[4, 0, 2, 9, 9]] * 9).aggregated)
+    assert winner(twice)[0, 8] == 2
+    assert parabola(twice, winner(twice))[0, 8] == -0.5, "its lowest point lies 0.9 px to the left"
+    level = replace(twice, first=strip([[9, 4, 0, 12, 9]] * 9).aggregated)
+    assert parabola(level, winner(level))[0, 8] == -0.25
