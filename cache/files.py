@@ -76,14 +76,20 @@ def in_threads(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
     if len(items) < 2:  # starting a thread would take longer
         return [function(item) for item in items]
     found: dict[int, R] = {}
-    waiting: deque[tuple[int, T] | None] = deque([*enumerate(items), None])
+    waiting = deque(enumerate(items))
+
+    def take() -> tuple[int, T] | None:
+        try:
+            return waiting.popleft()
+        except IndexError:  # to look first would be no use: another thread may take the last one in between
+            return None
 
     def work() -> None:  # a task a thread: one an item would take longer than looking at a small entry
         try:
-            while each := waiting.popleft():
+            while each := take():
                 found[each[0]] = function(each[1])
         finally:
-            waiting.appendleft(None)  # the next thread ends too: nothing is left, or something went wrong
+            waiting.clear()  # the other threads end too: nothing is left, or something went wrong
 
     with ThreadPoolExecutor(THREADS) as pool:
         try:
@@ -92,7 +98,7 @@ def in_threads(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
             for thread in threads:
                 thread.result()
         finally:
-            waiting.appendleft(None)
+            waiting.clear()
     return [found[number] for number in range(len(items))]
 
 

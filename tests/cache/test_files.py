@@ -5,10 +5,12 @@ import subprocess
 import sys
 import threading
 import time
+from collections import deque
 from pathlib import Path
 
 import pytest
 
+from semidense.cache import files
 from semidense.cache.errors import CacheUnavailable, DamagedEntry
 from semidense.cache.files import (
     THREADS,
@@ -131,3 +133,18 @@ def test_a_whole_file_that_cannot_take_its_place_leaves_nothing(tmp_path: Path) 
     with pytest.raises(OSError, match="file"):
         write_whole(tmp_path / "file", b"data")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+class Slow(deque):
+    """A queue that waits once the last thing was taken, so that others find it empty."""
+
+    def popleft(self) -> object:
+        item = super().popleft()
+        if not self:
+            time.sleep(0.02)
+        return item
+
+
+def test_threads_that_find_nothing_left_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "deque", Slow)
+    assert in_threads(lambda x: x * x, range(8)) == [x * x for x in range(8)]
