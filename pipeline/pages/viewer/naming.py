@@ -92,4 +92,5 @@ def _chosen(chain: Chain) -> Iterator[tuple[str, str]]:
 def _defaults(stage: str, preset: str) -> Mapping[str, Any]:
     """Return the settings of a stage that a preset has."""
     section = Config.load(preset=preset).section(STAGES[stage].section or stage)
-    return to_jsonable_python(dict(section), fallback=str)
+    found: Mapping[str, Any] = to_jsonable_python(dict(section), fallback=str)
+    return found
