@@ -26,8 +26,8 @@ PRESETS: Mapping[str, tuple[str, ...]] = {
 """The settings of each preset that differ from the defaults.
 
 - ``paper``: the method of the paper: single costs, winner takes all, whole disparities.
-- ``robust``: costs summed twice along paths before the winner is taken, with sub-pixel disparities: fewer wrong pixels where
-  texture is thin. The confidence weighs what the costs say as well.
+- ``robust``: costs summed twice along paths before the winner is taken, with sub-pixel disparities: fewer wrong pixels
+  where texture is thin. The confidence weighs what the costs say as well.
 - ``foreign``: the confidence of maps that another matcher made. It is a probability as it is, and needs no calibration.
 """
 DEFAULT = "paper"

@@ -1,11 +1,14 @@
 """Name a configuration as a person would: preset, mode, what sets it apart from the others, and when it was made."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 from pydantic_core import PydanticUndefined, to_jsonable_python
 
 from semidense.cache import Entry
+from semidense.pipeline.plan.config import Config
+from semidense.pipeline.plan.presets import DEFAULT
 from semidense.pipeline.results.settings import USES, stage_of
 from semidense.pipeline.results.text import time_text, value_text
 from semidense.stages.catalog import STAGES
@@ -22,7 +25,7 @@ Chain = Mapping[str, Entry]
 def names(chains: Sequence[Chain]) -> list[str]:
     """Return a name for each configuration of a scene, no two alike.
 
-    A setting is in it if it is not the default and not the same in all configurations. The hash of shipped weights is
+    A setting is in it if it is not the preset's and not the same in all configurations. The hash of shipped weights is
     in it only where the rest does not tell all configurations apart.
     """
     settings = [dict(_chosen(chain)) for chain in chains]
@@ -73,17 +76,21 @@ def _exchanged() -> list[str]:
 
 
 def _chosen(chain: Chain) -> Iterator[tuple[str, str]]:
-    """Yield the settings that are not the defaults, as text; each is named as ``--set`` takes it."""
+    """Yield the settings that are not those of the preset, as text; each is named as ``--set`` takes it."""
+    preset = _preset(chain) or DEFAULT
     for product, entry in chain.items():
         if product in ("images", "truth"):
             continue
         stage = stage_of(product, entry.recipe.params)
-        defaults = _defaults(stage) if stage in STAGES else {}
+        defaults = _defaults(stage, preset) if stage in STAGES else {}
         for name, value in entry.recipe.params.items():
             if name not in _UNSAID and defaults.get(name, PydanticUndefined) != value:
                 yield f"{stage}.{name}", value_text(value)
 
 
-def _defaults(stage: str) -> dict[str, Any]:
-    fields = STAGES[stage].params.model_fields
-    return {name: to_jsonable_python(field.default, fallback=str) for name, field in fields.items()}
+@cache
+def _defaults(stage: str, preset: str) -> Mapping[str, Any]:
+    """Return the settings of a stage that a preset has."""
+    section = Config.load(preset=preset).section(STAGES[stage].section or stage)
+    found: Mapping[str, Any] = to_jsonable_python(dict(section), fallback=str)
+    return found

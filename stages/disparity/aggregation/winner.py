@@ -30,8 +30,8 @@ def winner(strip: Strip) -> NDArray[np.int32]:
 def parabola(strip: Strip, index: NDArray[np.int32]) -> NDArray[np.float32]:
     """Return how far the lowest point of the parabola through the winner and its neighbours lies from it.
 
-    ``(S(d - 1) - S(d + 1)) / (2 (S(d - 1) - 2 S(d) + S(d + 1)))`` of the sums ``S`` of the first pass: those of a second
-    one lean more on the neighbours, so their lowest point lies further from the pixel's own.
+    ``(S(d - 1) - S(d + 1)) / (2 (S(d - 1) - 2 S(d) + S(d + 1)))`` of the sums ``S`` of the first pass: those of a
+    second one lean more on the neighbours, so their lowest point lies further from the pixel's own.
 
     Returns:
         (y, x) float32 in [-0.5, 0.5] px; 0 at an end of the range or of the image, and where the three do not bend.

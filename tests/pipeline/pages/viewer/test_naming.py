@@ -19,7 +19,7 @@ PAPER = {
 }
 ROBUST = {
     "confidence": entry("evidence_confidence"),
-    "disparity": entry("aggregated"),
+    "disparity": entry("aggregated", passes=2),
     "costvolume": entry("costvolume", mode="fast"),
 }
 
@@ -34,14 +34,17 @@ def test_preset_and_mode_come_first_and_the_time_last() -> None:
 
 
 def test_a_setting_that_differs_is_told() -> None:
-    wider = ROBUST | {"disparity": entry("aggregated", paths=16)}
+    wider = ROBUST | {"disparity": entry("aggregated", passes=2, paths=16)}
     assert shown(ROBUST, wider) == ["robust, fast", "robust, fast, aggregated.paths=16"]
     assert shown(wider, wider) == ["robust, fast", "robust, fast"], "what all share sets none apart"
+    once = ROBUST | {"disparity": entry("aggregated", passes=1)}
+    assert shown(ROBUST, once) == ["robust, fast", "robust, fast, aggregated.passes=1"], "a default is told, too"
 
 
 def test_the_hash_of_weights_is_told_only_where_nothing_else_differs() -> None:
     one, other = ({"evaluation_net": entry("evaluation_net", shipped=digest * 16)} for digest in ("abcd", "ef01"))
-    assert shown(PAPER | one, ROBUST | other) == ["paper, exact", "robust, fast"]
+    of_robust = {"evaluation_net": entry("evaluation_net", shipped="ef01" * 16, steps=800)}
+    assert shown(PAPER | one, ROBUST | of_robust) == ["paper, exact", "robust, fast"]
     assert shown(PAPER | one, PAPER | other) == [
         f"paper, exact, evaluation_net.shipped={digest * 3}" for digest in ("abcd", "ef01")
     ]

@@ -114,9 +114,7 @@ class Watched:
         pytest.param(1, 10, [(0, 10)], id="one strip is read once"),
         pytest.param(1, 4, [(0, 4), (4, 8), (8, 10), (4, 8), (0, 4)], id="down, then up"),
         pytest.param(2, 10, [(0, 10)], id="one strip is read once for two passes, too"),
-        pytest.param(
-            2, 4, [(8, 10), (4, 8), (0, 4), (4, 8), (8, 10), (4, 8), (0, 4)], id="up, down, and up once more"
-        ),
+        pytest.param(2, 4, [(8, 10), (4, 8), (0, 4), (4, 8), (8, 10), (4, 8), (0, 4)], id="up, down, and up once more"),
     ],
 )
 def test_never_more_than_a_strip_is_read(passes: int, rows: int, expected: Sequence[tuple[int, int]]) -> None:
