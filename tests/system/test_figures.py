@@ -16,10 +16,10 @@ MEASURED = re.compile(r"[\s*<>~-]*\d[\d.,]*( %)?[\s*]*")
 """A cell that is a number and nothing else."""
 NAMED = re.compile(
     r"`[^`]*(pipeline \w|python -m (benchmarks|tests)\.|make \w|--\w)[^`]*`|^(pipeline|python -m) "
-    r"|<!-- make faults -->|trials?\s+without\s+a\s+command",
+    r"|<!-- make faults -->",
     re.MULTILINE,
 )
-"""A command, or the remark that there is no command."""
+"""A command."""
 
 
 TOLD = re.compile(r"\d+\.\d+ (%|points)|\b0\.0\d{3}\b|\b\d+\.\d+ (s|[GM]B)\b")
