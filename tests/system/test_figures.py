@@ -82,7 +82,7 @@ HEAD = "## Speed\n\n| | seconds |\n|---|---|\n| ours | 1.5 |\n| theirs | 2.5 |\n
         pytest.param("", True, id="no command"),
         pytest.param("`python -m benchmarks.peers` prints it.\n", False, id="a command"),
         pytest.param("```\npipeline run motorcycle\n```\n", False, id="a block"),
-        pytest.param("This was a trial without a command.\n", False, id="a trial"),
+        pytest.param("This was a trial without a command.\n", True, id="a trial"),
         pytest.param("\n## Next\n\n`make bench`\n", True, id="the command of another section"),
     ],
 )
@@ -98,7 +98,7 @@ def test_a_table_without_a_command_is_found(beside: str, found: bool) -> None:
         pytest.param("It takes 2.5 s.", True, id="a time"),
         pytest.param("`pipeline run motorcycle` prints 1.4 %.", False, id="a command"),
         pytest.param("Of these 1.4 % are wrong ([table](accuracy.md)).", False, id="a link to the table"),
-        pytest.param("A trial without a command: 1.4 % are wrong.", False, id="a trial"),
+        pytest.param("A trial without a command: 1.4 % are wrong.", True, id="a trial"),
         pytest.param("`--density 1.4 %`, from version 0.1 on, keeps 80 % of the 3 x 3 px.", False, id="no measurement"),
     ],
 )
