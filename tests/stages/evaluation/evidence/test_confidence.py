@@ -102,7 +102,7 @@ def test_what_costs_say_around_a_pixel_is_told_of_those_with_a_disparity() -> No
 def test_what_is_dropped_is_dropped_beside_a_hole_too(folder: str, difference: float) -> None:
     """The pixels of a range far from 0 begin beside a band without disparities, which no training scene has.
 
-    The costs are those of a wrong surface with little texture: nothing stands out, and the single costs and the right view
+    The costs are those of a wrong surface with little texture: nothing stands out. The single costs and the right view
     say something else.
     """
     weights = Path(semidense.stages.weights.__file__).parent / folder
