@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 MODE := exact
-APART := tests/faults tests/benchmarks tests/cache tests/datasets tests/stages
+APART := tests/faults tests/benchmarks tests/cache tests/datasets tests/stages tests/system/test_silence.py
 OF_MODE := $(if $(filter guided,$(MODE)),.guided)
 ifeq ($(filter exact guided,$(MODE)),)
 $(error MODE=$(MODE): the weights that come with the package are of exact and of guided volumes)
