@@ -25,14 +25,14 @@ from semidense.pipeline.plan.steps import (
     Request,
     Step,
     code_of,
+    known_so_far,
     made_from,
-    needs_range,
     place,
-    products,
     scope_of,
+    without_truth,
 )
-from semidense.pipeline.plan.training_split import outside, spread, with_folds
-from semidense.stages.catalog import READ, STAGES
+from semidense.pipeline.plan.training_split import held_out_scenes, outside, spread, with_folds
+from semidense.stages.catalog import STAGES
 from semidense.stages.compute.precision import resolve
 from semidense.stages.evaluation.calibration.declaration import CalibrationParams
 from semidense.stages.evaluation.filtering import SemidenseParams
@@ -74,23 +74,11 @@ def _targets(builder: "_Builder", trained_on: Sequence[Mapping[str, Any]]) -> It
             notes.append(f"{scene.name} is a training scene: it is left out, since nothing is tested on it")
         elif not scene.has_truth and "truth" in made_from(upto):
             notes.append(f"{scene.name} has no ground truth: no {upto} can be made for it")
-            yield builder.product(_known(scene, _without_truth(upto), notes), scene)
+            yield builder.product(known_so_far(scene, without_truth(upto), notes), scene)
         else:
-            yield from (builder.product(_known(scene, each, notes), scene) for each in (upto, *builder.request.also))
-
-
-def _without_truth(product: str) -> str:
-    """Return the last product on the way to one that needs a truth which can be made without it."""
-    ways = [each for each in products() if each in made_from(product) and "truth" not in made_from(each)]
-    return ways[-1] if ways else READ[0]
-
-
-def _known(scene: SceneSource, product: str, notes: list[str]) -> str:
-    """Return the product, or the one to stop at while the scene's range is open."""
-    if not (scene.open_ends and needs_range(product)):
-        return product
-    notes.append(f"{scene.name}: the range of disparities is estimated first; a run shows what comes after `survey`")
-    return "survey"
+            yield from (
+                builder.product(known_so_far(scene, each, notes), scene) for each in (upto, *builder.request.also)
+            )
 
 
 @dataclass
@@ -122,17 +110,9 @@ class _Builder:
         return self.known[asked]
 
     def held_out(self, product: str) -> Iterator[str]:
-        """Add a product of each training scene that was asked for, made by networks that have not seen it.
-
-        Raises:
-            UsageError: if nothing is trained.
-        """
-        if not self.request.train:
-            raise UsageError("training.held_out judges the training scenes by networks of other scenes: add --train")
-        asked = {(scene.dataset, scene.name) for scene in self.request.dataset.scenes}
-        for scene in self._mapped():
-            if (scene.dataset, scene.name) in asked:
-                yield self._not_having_seen(scene).product(product, scene)
+        """Add a product of each training scene that was asked for, made by networks that have not seen it."""
+        for scene in held_out_scenes(self.config, self.request.dataset, self._mapped() if self.request.train else ()):
+            yield self._not_having_seen(scene).product(product, scene)
 
     def _add_product(self, product: str, scene: SceneSource | None) -> str:
         if scene and (source := source_of(product, scene)):

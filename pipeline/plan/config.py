@@ -51,10 +51,7 @@ class TrainingParams(Params):
     cross_fit: bool = Field(
         False, description="learn from maps that networks made which have not seen the scene: as wrong as new maps"
     )
-    held_out: bool = Field(
-        False,
-        description="judge the training scenes themselves, each by networks that have not seen it; needs --train",
-    )
+    held_out: bool = Field(False, description="with --train: judge training scenes, by networks of other scenes")
 
 
 class Config(BaseModel):

@@ -190,3 +190,17 @@ def code_of(*modules: str) -> dict[str, str]:
     """Return the hashes of modules and of all that they import from this package or their own."""
     packages = ("semidense", *(module.partition(".")[0] for module in modules))
     return {name: part for module in modules for name, part in code_parts(module, tuple(sorted({*packages}))).items()}
+
+
+def without_truth(product: str) -> str:
+    """Return the last product on the way to one that needs a truth which can be made without it."""
+    ways = [each for each in products() if each in made_from(product) and "truth" not in made_from(each)]
+    return ways[-1] if ways else READ[0]
+
+
+def known_so_far(scene: SceneSource, product: str, notes: list[str]) -> str:
+    """Return the product, or the one to stop at while the scene's range is open; add a note of that."""
+    if not (scene.open_ends and needs_range(product)):
+        return product
+    notes.append(f"{scene.name}: the range of disparities is estimated first; a run shows what comes after `survey`")
+    return "survey"

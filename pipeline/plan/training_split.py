@@ -8,6 +8,7 @@ from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.errors import UsageError
 from semidense.stages.catalog import STAGES
 from semidense.stages.evaluation.calibration.declaration import CalibrationParams
+from semidense.stages.evaluation.filtering import SemidenseParams
 from semidense.stages.learning.schedule import Schedule
 from semidense.stages.stage import Params
 
@@ -53,6 +54,24 @@ def with_folds(config: Config, names: Sequence[str]) -> Config:
     update["training"] = config.training.model_copy(update={"shipped": ()})
     update["weights"] = type(config.section("weights"))()
     return config.model_copy(update=update)
+
+
+def held_out_scenes(config: Config, dataset: Dataset, training: Sequence[SceneSource]) -> list[SceneSource]:
+    """Return the training scenes that are judged by networks of the other folds: those of the dataset.
+
+    Raises:
+        UsageError: if nothing is trained, the dataset has no training scene, or a calibration would be needed.
+    """
+    if not training:
+        raise UsageError("training.held_out judges the training scenes by networks of other scenes: add --train")
+    semidense = config.of("semidense", SemidenseParams)
+    if semidense.calibrated or semidense.max_error is not None:
+        raise UsageError("training.held_out: its networks have no calibration; give R or a density instead")
+    asked = {(scene.dataset, scene.name) for scene in dataset.scenes}
+    scenes = [scene for scene in training if (scene.dataset, scene.name) in asked]
+    if not scenes:
+        raise UsageError(f"{dataset.spec}: training.held_out judges training scenes, and none is named")
+    return scenes
 
 
 def outside(scenes: Sequence[_Scene], folds: Sequence[int], fold: int) -> tuple[_Scene, ...]:

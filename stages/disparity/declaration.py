@@ -45,7 +45,7 @@ class AggregatedParams(Params):
     )
     edge_divisor: float = Field(8, ge=1, le=1000, description="both penalties are divided by it at an edge")
     passes: Literal[1, 2] = Field(
-        1, description="2: sum once more, after the mean of its first path costs was added to the cost of each cell"
+        1, description="2: add the mean of the first path costs to the cost of each cell, and sum once more"
     )
     subpixel: bool = Field(True, description="refine by a parabola through three summed costs")
 

@@ -149,9 +149,21 @@ def test_held_out_scenes_are_those_whose_maps_are_learnt_from_and_that_were_aske
     assert [made.steps[target].scene for target, _ in made.targets] == ["train-1"]
 
 
-def test_scenes_are_held_out_of_a_training_only() -> None:
-    with pytest.raises(UsageError, match=r"training\.held_out judges .* add --train"):
-        graph("training.held_out=true")
+@pytest.mark.parametrize(
+    ("settings", "train", "named", "told"),
+    [
+        pytest.param((), False, "train-0", r"judges .* add --train", id="nothing is trained"),
+        pytest.param((), True, "test-0", r"and none is named", id="no training scene"),
+        pytest.param(("semidense.max_error=0.1",), True, "train-0", r"no calibration; give R", id="a wanted error"),
+        pytest.param(("semidense.calibrated=true",), True, "train-0", r"no calibration; give R", id="calibrated"),
+    ],
+)
+def test_what_cannot_be_held_out_is_refused(settings: tuple[str, ...], train: bool, named: str, told: str) -> None:
+    config = Config.load(None, ["training.held_out=true", *settings])
+    training = training_scenes(DATASET) if train else ()
+    with pytest.raises(UsageError, match=told) as caught:
+        build(Request(DATASET.select([named]), {"": config}, "metrics", train, training))
+    assert "\n" not in str(caught.value)
 
 
 def test_a_calibration_takes_the_cross_fitted_maps_of_the_evidence() -> None:

@@ -97,17 +97,9 @@ def test_what_costs_say_around_a_pixel_is_told_of_those_with_a_disparity() -> No
     assert np.allclose(around, np.float32([3, 3, 1, 1, 1, 1])[:, None, None], atol=1e-4)
 
 
-@pytest.mark.parametrize("folder", ["", "general/"])
-@pytest.mark.parametrize("difference", [2, 4, 8])
-def test_what_is_dropped_is_dropped_beside_a_hole_too(folder: str, difference: float) -> None:
-    """The pixels of a range far from 0 begin beside a band without disparities, which no training scene has.
-
-    The costs are those of a wrong surface with little texture: nothing stands out. The single costs and the right view
-    say something else.
-    """
-    weights = Path(semidense.stages.weights.__file__).parent / folder
-    margins = {"aggregated_margin": 0.5, "single_margin": 0.1, "single_excess": 3, "left_right": difference}
-    given = with_a_hole({**margins, "aggregated_flatness": 0.1, "single_flatness": 0.3, "single_minima": 6})
+def require_dropped(folder: str, said: dict[str, float]) -> None:
+    """Fail if a set of weights is sure of a pixel, away from the hole or beside it."""
+    weights, given = Path(semidense.stages.weights.__file__).parent / folder, with_a_hole(said)
     nets = {
         product: read_weights(product, (weights / f"{product}.safetensors").read_bytes())
         for product in ("evaluation_net", "evidence_net")
@@ -116,6 +108,30 @@ def test_what_is_dropped_is_dropped_beside_a_hole_too(folder: str, difference: f
     made = sigmoid(weigh(nets["evidence_net"]["parameters"], known))
     assert made[:, 60:80].max() < 0.9
     assert made[:, 30:45].max() < 0.9
+
+
+@pytest.mark.parametrize("folder", ["", "general/"])
+@pytest.mark.parametrize("difference", [2, 4, 8])
+def test_what_is_dropped_is_dropped_beside_a_hole_too(folder: str, difference: float) -> None:
+    """The pixels of a range far from 0 begin beside a band without disparities, which no training scene has.
+
+    The costs are those of a wrong surface with little texture: nothing stands out. The single costs and the right view
+    say something else.
+    """
+    margins = {"aggregated_margin": 0.5, "single_margin": 0.1, "single_excess": 3, "left_right": difference}
+    require_dropped(folder, {**margins, "aggregated_flatness": 0.1, "single_flatness": 0.3, "single_minima": 6})
+
+
+@pytest.mark.parametrize(
+    "folder",
+    ["", pytest.param("general/", marks=pytest.mark.xfail(strict=True, reason="0.94 to 0.997: a fault of these nets"))],
+)
+@pytest.mark.parametrize("margin", [0.5, 2, 8])
+def test_what_costs_cannot_say_together_is_dropped(folder: str, margin: float) -> None:
+    """Nothing stands out or the right view differs, and yet no other disparity is nearly as good."""
+    require_dropped(
+        folder, {**dict.fromkeys(("aggregated_margin", "single_margin", "left_right"), margin), "agrees": 1}
+    )
 
 
 def test_the_evaluation_net_answers_at_every_fourth_pixel() -> None:
