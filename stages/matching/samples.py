@@ -23,13 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.learning.scenes import Scenes
+from semidense.stages.learning.truth import is_dense
 from semidense.stages.matching.declaration import MatchingSamples, MatchingSamplesParams, OfTruths
 from semidense.stages.stage import StageError, Truth, by_scene
 
 NEAR = 6
 """Largest distance from the truth, in pixels, of a mismatch that is drawn beside it."""
-DENSE = 0.5
-"""Share of known pixels above which a truth is dense; the laser scanner of KITTI gives 13 to 35 %."""
 ABSENT = np.iinfo(np.int32).min
 """Fills the slots of a sample that has fewer disparities than the others."""
 
@@ -78,7 +77,7 @@ def _scene_of_sample(params: MatchingSamplesParams, truths: Sequence[Truth]) -> 
 
     Without ``dense_share``, or with truths of one kind only, every scene has as many samples as the others, within one.
     """
-    dense = np.array([np.isfinite(truth["disparity"]).mean() > DENSE for truth in truths])
+    dense = np.array([is_dense(truth["disparity"]) for truth in truths])
     if params.dense_share is None or dense.all() or not dense.any():
         return np.arange(params.samples) % len(truths)
     of_dense = round(params.samples * params.dense_share)

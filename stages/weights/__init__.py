@@ -17,7 +17,7 @@ from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 from torch import nn
 
-from semidense.stages.evaluation.evidence.foreign.declaration import FEATURES
+from semidense.stages.evaluation.evidence.foreign.net import ForeignNet
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.parameters import count, from_vector, to_vector
@@ -47,7 +47,7 @@ def candidates(product: str) -> list[nn.Module]:
     if product == "evidence_net":
         return [EvidenceNet()]
     if product == "foreign_net":
-        return [EvidenceNet(len(FEATURES))]
+        return [ForeignNet()]
     raise StageError(
         f"{product} is no network: weights are those of matching_net, descriptor_net, evaluation_net, evidence_net or "
         "foreign_net"

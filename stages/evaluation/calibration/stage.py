@@ -9,6 +9,7 @@ from semidense.stages.evaluation.calibration.declaration import MAPS, Calibrated
 from semidense.stages.evaluation.calibration.maps import FITS, calibrate, cross_validate
 from semidense.stages.evaluation.calibration.table import Table, tally
 from semidense.stages.evaluation.declaration import Confidence
+from semidense.stages.learning.truth import is_dense
 from semidense.stages.stage import DisparityMap, NoParams, StageError, Truth, by_scene
 
 
@@ -36,7 +37,12 @@ def compute_calibration(params: CalibrationParams, inputs: ScoredMaps) -> Calibr
     scores_of = by_scene(inputs["confidence"], "confidence")
     scenes = zip(scores_of, inputs["disparity"], inputs["truth"], strict=True)
     counts = [
-        tally(confidence["confidence"], disparity["disparity"], truth["disparity"], params.tolerance)
+        tally(
+            confidence["confidence"],
+            disparity["disparity"],
+            truth["disparity"],
+            params.tolerance if is_dense(truth["disparity"]) else params.sparse_tolerance,
+        )
         for confidence, disparity, truth in scenes
     ]
     table = Table(np.stack([right for right, _ in counts]), np.stack([wrong for _, wrong in counts]), params.tolerance)

@@ -1,5 +1,8 @@
 """The confidence of each pixel of a map by summed costs, weighed from all that is known of it."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -7,23 +10,23 @@ from numpy.typing import NDArray
 from semidense.stages.compute.threads import one_thread
 from semidense.stages.evaluation.confidence import sigmoid
 from semidense.stages.evaluation.declaration import Confidence
-from semidense.stages.evaluation.evidence.declaration import EvidenceConfidenceParams, WithEvidence
+from semidense.stages.evaluation.evidence.declaration import REACH, EvidenceConfidenceParams, WithEvidence
 from semidense.stages.evaluation.evidence.features import features
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.evidence.of_map import AGREEMENT, NETWORK, opened
 from semidense.stages.evaluation.silence.veto import vetoed
 from semidense.stages.learning.parameters import from_vector
+from semidense.stages.stage import Images
 
 
 @one_thread()
-def weigh(parameters: NDArray[np.float32], stacked: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the log-odds (y, x) that each disparity is right, of features (feature, y, x)."""
-    net = EvidenceNet(len(stacked))
+def weigh(parameters: NDArray[np.float32], known: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the log-odds (y, x) that each disparity is right, of features (feature, y + 2 REACH, x)."""
+    net = EvidenceNet()
     from_vector(net, parameters)
     with torch.inference_mode():
-        rows = np.ascontiguousarray(stacked.reshape(len(stacked), -1).T)
-        odds: NDArray[np.float32] = net(torch.from_numpy(rows)).numpy()
-    return odds.reshape(stacked.shape[1:])
+        odds: NDArray[np.float32] = net(torch.from_numpy(known)[None])[0].numpy()
+    return odds
 
 
 def compute_evidence_confidence(params: EvidenceConfidenceParams, inputs: WithEvidence) -> Confidence:
@@ -32,10 +35,27 @@ def compute_evidence_confidence(params: EvidenceConfidenceParams, inputs: WithEv
     Raises:
         StageError: if the disparity map brings no evidence of its costs.
     """
-    known = features(inputs["images"], inputs["disparity"], inputs["evaluation_net"], params.precision)
+    # The net looks away from a row; beside the map it sees nothing.
+    images: Images = {**inputs["images"], "left": inputs["images"]["left"][:, REACH:-REACH]}
+    maps: Mapping[str, Any] = inputs["disparity"]
+    disparity = {name: array[..., REACH:-REACH] for name, array in maps.items()}
+    known = features(images, disparity, inputs["evaluation_net"], params.precision)
     confidence = sigmoid(weigh(inputs["evidence_net"]["parameters"], known))
+    middle = known[:, REACH:-REACH]
     return {
-        "confidence": np.where(vetoed(inputs), np.float32(0), confidence) if params.veto else confidence,
-        "network": sigmoid(opened(known[NETWORK])),
-        "agreement": opened(known[AGREEMENT]),
+        "confidence": np.where(_vetoed(inputs), np.float32(0), confidence) if params.veto else confidence,
+        "network": sigmoid(opened(middle[NETWORK])),
+        "agreement": opened(middle[AGREEMENT]),
     }
+
+
+def _vetoed(inputs: WithEvidence) -> NDArray[np.bool_]:
+    around = (slice(REACH, -REACH),) * 2
+    views = inputs["distinctiveness"]
+    return vetoed(
+        {
+            "distinctiveness": {"left": views["left"][around], "right": views["right"][around]},
+            "disparity": {"disparity": inputs["disparity"]["disparity"][around]},
+            "cost_margin": {"margin": inputs["cost_margin"]["margin"][around]},
+        }
+    )

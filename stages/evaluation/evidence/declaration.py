@@ -47,24 +47,38 @@ OF_NEIGHBOURS = tuple(f"{name} {side}" for name in ("aggregated_margin", "left_r
 where the single costs agree; see ``stages.disparity.evidence``."""
 
 
+DILATIONS = (1, 2, 4)
+"""Distance of the taps of each of the kernels of the net that weighs the evidence, in pixels of half the size."""
+REACH = 2 * (sum(DILATIONS) + 1)
+"""Rows that this net looks away from a pixel's own, px; even, since it looks at half the size."""
+
+
 class EvidenceNetParams(Schedule):
     """How the net that weighs the evidence learns."""
 
-    steps: int = Field(4000, ge=1, description="optimiser steps")
+    steps: int = Field(2000, ge=1, description="optimiser steps")
     optimiser: Literal["muon", "adam"] = Field("adam", description="what makes a step of a large kernel's gradient")
-    peak_rate: float = Field(0.01, gt=0, description="highest learning rate")
-    checkpoint_steps: int = Field(500, ge=1, description="steps between two checkpoints", exclude=True)
-    batch: int = Field(4096, ge=SHARDS, multiple_of=SHARDS, description="pixels a step; a multiple of the shards")
-    tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
-    seed: int = Field(0, ge=0, description="seed of the weights")
+    batch: int = Field(8, ge=SHARDS, multiple_of=SHARDS, description="crops a step; a multiple of the shards")
+    height: int = Field(96, ge=2, multiple_of=2, description="rows of a crop that are judged, px")
+    width: int = Field(96, ge=2, description="columns of a crop, px")
+    contradicted: float = Field(
+        0.1,
+        ge=0,
+        le=1,
+        description="share of the crops in which a region gets, for each kind of evidence, that of other pixels, "
+        "where it is bad",
+    )
+    seed: int = Field(0, ge=0, description="seed of the weights and of what is drawn")
 
 
 class EvidenceSamplesParams(Params):
-    """Which pixels of a training scene the net that weighs the evidence learns from."""
+    """What counts as right in a training scene."""
 
-    pixels: int = Field(20000, ge=1, description="pixels of each training scene, drawn at random")
+    tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
+    sparse_tolerance: float = Field(
+        1.25, gt=0, description="the same in a scene with a sparse truth, which a laser measured less exactly, px"
+    )
     precision: Precision = Field("auto", description="arithmetic of the evaluation-Net: float32 or bfloat16")
-    seed: int = Field(0, ge=0, description="seed of the draw")
 
 
 class EvidenceConfidenceParams(Params):
@@ -85,7 +99,7 @@ class EvidenceConfidenceParams(Params):
 
 
 class EvidentScene(TypedDict):
-    """A training scene whose pixels are drawn, and the evaluation-Net that scores them."""
+    """A training scene, and the evaluation-Net that scores them."""
 
     images: Images
     disparity: DisparityMap
@@ -94,14 +108,17 @@ class EvidentScene(TypedDict):
 
 
 class EvidenceSamples(TypedDict):
-    """The product ``evidence_samples``: (pixel, feature) what is known of each, (pixel,) error of its disparity, px."""
+    """The product ``evidence_samples``: what is known of each pixel of a scene, and whether its disparity is right.
 
-    features: NDArray[np.float32]
-    error: NDArray[np.float32]
+    ``features`` has ``REACH`` more rows than ``right`` above and below.
+    """
+
+    features: NDArray[np.floating]
+    right: NDArray[np.int8]
 
 
 class OfEvidenceSamples(TypedDict):
-    """What the net that weighs the evidence learns from: the drawn pixels of every training scene."""
+    """What the net that weighs the evidence learns from: the pixels of every training scene."""
 
     evidence_samples: Sequence[EvidenceSamples]
 
@@ -116,10 +133,10 @@ EVIDENCE_SAMPLES = Stage(
     product="evidence_samples",
     inputs=("images", "disparity", "truth", "evaluation_net"),
     outputs=(
-        Output("features", ("pixel", "feature"), "float32", "1", "what is known of each pixel: sign(v) ln(1 + |v|)"),
-        Output("error", ("pixel",), "float32", "px", "distance of the disparity from the truth"),
+        Output("features", ("feature", "seen", "column"), "float16", "1", "what is known: sign(v) ln(1 + |v|)"),
+        Output("right", ("row", "column"), "int8", "1", "1 right, 0 wrong, -1 unknown"),
     ),
-    compute="semidense.stages.evaluation.evidence.samples:draw_evidence_samples",
+    compute="semidense.stages.evaluation.evidence.samples:compute_evidence_samples",
     params=EvidenceSamplesParams,
 )
 """``disparity`` brings the array ``evidence`` (feature, y, x): ``use.disparity=aggregated``."""
@@ -151,7 +168,7 @@ EVIDENCE_CONFIDENCE = Stage(
     compute="semidense.stages.evaluation.evidence.confidence:compute_evidence_confidence",
     params=EvidenceConfidenceParams,
     tile_rows=256,
-    halo=lambda _: RADIUS,
+    halo=lambda _: RADIUS + REACH,
     border="edge",
 )
 """``use.confidence=evidence_confidence`` puts it in the place of ``confidence``."""

@@ -47,11 +47,14 @@ def features(
 
 
 def of_whole_map(
-    images: Images, disparity: Mapping[str, Any], evaluation_net: Network, precision: Precision
+    images: Images, disparity: Mapping[str, Any], evaluation_net: Network, precision: Precision, rows: int = 0
 ) -> NDArray[np.float32]:
-    """As ``features``, of arrays without context: beyond the image lies the nearest pixel, as in a tile."""
-    around = (RADIUS, RADIUS)
-    views: Images = {**images, "left": np.pad(images["left"], (around, around, (0, 0)), mode="edge")}
-    margins = {"disparity": (around, around), "evidence": ((0, 0), around, around)}
+    """As ``features``, of arrays without context: beyond the image lies the nearest pixel, as in a tile.
+
+    The result has so many ``rows`` more above and below.
+    """
+    above, beside = (RADIUS + rows, RADIUS + rows), (RADIUS, RADIUS)
+    views: Images = {**images, "left": np.pad(images["left"], (above, beside, (0, 0)), mode="edge")}
+    margins = {"disparity": (above, beside), "evidence": ((0, 0), above, beside)}
     padded = {name: np.pad(array, margins[name], mode="edge") for name, array in disparity.items()}
     return features(views, padded, evaluation_net, precision)

@@ -1,46 +1,50 @@
-"""The net that weighs the evidence of one pixel."""
+"""The net that weighs the evidence of each pixel, and that around it."""
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from semidense.stages.disparity.evidence import FEATURES
-from semidense.stages.evaluation.evidence.declaration import OF_MAP, OF_NEIGHBOURS
+from semidense.stages.evaluation.evidence.declaration import DILATIONS, OF_MAP, OF_NEIGHBOURS, REACH
+from semidense.stages.evaluation.evidence.standard import Standardised
 
 INPUTS = len(OF_MAP) + len(FEATURES) + len(OF_NEIGHBOURS)
-"""What a map by our own summed costs looks like, what the costs say of the pixel, and what they say around it."""
+"""What a map by our own summed costs looks like, what the costs say of the pixel, and what they say in its windows."""
 HIDDEN = 32
-CONSTANT, UNSEEN = 1e-3, 1e9
-"""A number whose deviation in training is below the first tells nothing: its scale is the second, so that it never
-counts. With its own scale it would outweigh all others in a map where it does vary."""
+FARTHEST = 4.0
+"""Deviations from the mean beyond which an input counts the same: what no training scene has, must not decide."""
 
 
-class EvidenceNet(nn.Module):
-    """From what is known of a pixel to the log-odds that its disparity is right: two hidden layers of 32 units.
+class EvidenceNet(Standardised):
+    """From what is known of the pixels to the log-odds that their disparities are right.
 
-    Args:
-        inputs: numbers that are known of a pixel; by default those of a map by our own summed costs.
+    One branch sees a pixel alone. The other one sees the map at half the size and looks at its surroundings with three
+    3 x 3 kernels of growing dilation; each adds to what was there. Both are joined and give one number a pixel.
     """
 
-    centre: Tensor
-    scale: Tensor
-
-    def __init__(self, inputs: int = INPUTS) -> None:
-        super().__init__()
-        # The inputs' mean and deviation in training, kept with the weights.
-        self.register_buffer("centre", torch.zeros(inputs))
-        self.register_buffer("scale", torch.ones(inputs))
-        self.first = nn.Linear(inputs, HIDDEN)
-        self.second = nn.Linear(HIDDEN, HIDDEN)
-        self.out = nn.Linear(HIDDEN, 1)
-
-    def measure(self, features: Tensor) -> None:
-        """Take the mean and the deviation of the inputs from the training's features (pixel, feature)."""
-        self.centre.copy_(features.mean(dim=0))
-        deviation = features.std(dim=0, correction=0)
-        self.scale.copy_(deviation.where(deviation > CONSTANT, torch.tensor(UNSEEN)))
+    def __init__(self) -> None:
+        super().__init__(INPUTS)
+        self.first = nn.Conv2d(INPUTS, HIDDEN, 1)
+        self.around = nn.ModuleList(
+            nn.Conv2d(HIDDEN, HIDDEN, 3, dilation=apart, padding=(0, apart)) for apart in DILATIONS
+        )
+        self.of_pixel = nn.Conv2d(HIDDEN, HIDDEN, 1)
+        self.of_around = nn.Conv2d(HIDDEN, HIDDEN, 1, bias=False)
+        self.out = nn.Conv2d(HIDDEN, 1, 1)
 
     def forward(self, features: Tensor) -> Tensor:
-        """Return log-odds (pixel,) of features (pixel, feature)."""
-        hidden = torch.relu(self.first((features - self.centre) / self.scale))
-        odds: Tensor = self.out(torch.relu(self.second(hidden))).squeeze(1)
+        """Return log-odds (map, y, x) of features (map, feature, y + 2 REACH, x).
+
+        The rows above and below are real ones or those that continue the map. Beside the map there is nothing: zeros.
+        Rows are taken in pairs, so a tile begins at an even row.
+        """
+        height, width = features.shape[2] - 2 * REACH, features.shape[3]
+        alone = torch.relu(self.first(self.standardised(features).clamp(-FARTHEST, FARTHEST)))
+        wide = functional.avg_pool2d(alone, 2, ceil_mode=True)
+        for kernel, apart in zip(self.around, DILATIONS, strict=True):
+            wide = wide[:, :, apart:-apart] + torch.relu(kernel(wide))
+        wide = functional.interpolate(self.of_around(wide), scale_factor=2.0, mode="bilinear", align_corners=False)
+        first = REACH - 2 * sum(DILATIONS)  # the row of the wide branch that is the first of the result
+        of_pixel = self.of_pixel(alone[:, :, REACH : REACH + height])
+        odds: Tensor = self.out(torch.relu(of_pixel + wide[:, :, first : first + height, :width]))[:, 0]
         return odds

@@ -1,31 +1,37 @@
-"""Pixels of a training scene's map, with what is known of each: what the net that weighs the evidence learns from."""
+"""What is known of each pixel of a training scene's map: what the net that weighs the evidence learns from."""
 
 import numpy as np
 
-from semidense.stages.evaluation.evidence.declaration import EvidenceSamples, EvidenceSamplesParams, EvidentScene
+from semidense.stages.evaluation.evidence.declaration import (
+    REACH,
+    EvidenceSamples,
+    EvidenceSamplesParams,
+    EvidentScene,
+)
 from semidense.stages.evaluation.evidence.features import of_whole_map
+from semidense.stages.evaluation.samples import UNKNOWN, label_pixels
+from semidense.stages.learning.truth import is_dense
+from semidense.stages.stage import StageError
 
 
-def draw_evidence_samples(params: EvidenceSamplesParams, inputs: EvidentScene) -> EvidenceSamples:
-    """Draw pixels of a scene whose truth is known, hidden ones too: a map answers for those as well.
+def compute_evidence_samples(params: EvidenceSamplesParams, inputs: EvidentScene) -> EvidenceSamples:
+    """Tell what is known of a scene, and which pixels are right; hidden ones too: a map answers for those as well.
 
     Args:
-        params: how many pixels, and the seed.
+        params: what is right.
         inputs: ``images``, ``disparity`` with ``evidence``, ``truth`` and ``evaluation_net``.
 
     Returns:
-        ``features`` float32 (pixel, feature) and ``error`` float32 (pixel,), px. A pixel without a disparity is not
-        drawn; a scene with fewer pixels than ``params.pixels`` gives all it has.
+        ``features`` float16 (feature, seen, column) and ``right`` int8 (row, column): 1 right, 0 wrong, -1 without a
+        disparity or a truth. The first row of ``right`` is row ``REACH`` of ``features``.
 
     Raises:
-        StageError: if the map brings no evidence of its costs.
+        StageError: if the map brings no evidence of its costs, or no pixel has both a disparity and a truth.
     """
-    disparity = inputs["disparity"]
-    stacked = of_whole_map(inputs["images"], disparity, inputs["evaluation_net"], params.precision)
-    error = np.abs(disparity["disparity"] - inputs["truth"]["disparity"]).ravel()
-    judged = np.flatnonzero(np.isfinite(error))
-    chosen = np.random.default_rng(params.seed).choice(judged, min(params.pixels, judged.size), replace=False)
-    return {
-        "features": np.ascontiguousarray(stacked.reshape(len(stacked), -1)[:, chosen].T),
-        "error": error[chosen].astype(np.float32),
-    }
+    disparity, truth = inputs["disparity"]["disparity"], inputs["truth"]["disparity"]
+    known = of_whole_map(inputs["images"], inputs["disparity"], inputs["evaluation_net"], params.precision, REACH)
+    tolerance = params.tolerance if is_dense(truth) else params.sparse_tolerance
+    right = np.where(np.isnan(disparity), np.int8(UNKNOWN), label_pixels(disparity, truth, tolerance))
+    if (right == UNKNOWN).all():
+        raise StageError("a training scene has no pixel with a disparity and a known truth")
+    return {"features": known.astype(np.float16), "right": right}

@@ -27,6 +27,7 @@ from tests.faults.tally import Tally
 from tests.tiny import TEST_ONLY
 
 PROJECT = Path(__file__).parents[3]
+NAMES = PROJECT / "build" / "names"
 SCENES = 8
 EDITS = (
     ("stages/transforms/gray.py", "semidense.stages.transforms.gray"),
@@ -73,7 +74,7 @@ def _edited_installation(folder: Path, path: str) -> Iterator[Path]:
 def _worker(address: str, names: Path, log: Path) -> "subprocess.Popen[bytes]":
     command = ["-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(names), str(PROJECT)])}
-    with log.open("wb") as file:
+    with log.open("ab") as file:
         return subprocess.Popen(
             [sys.executable, *command], env=environment, cwd=names, stdout=file, stderr=subprocess.STDOUT
         )
@@ -81,13 +82,43 @@ def _worker(address: str, names: Path, log: Path) -> "subprocess.Popen[bytes]":
 
 @contextmanager
 def cluster(workers: int) -> Iterator[str]:
-    """Start a scheduler, with worker processes that are started again when they die."""
-    from distributed import LocalCluster
+    """Start a scheduler, with worker processes; another one is started when one dies."""
+    from distributed import Client, LocalCluster
 
-    with LocalCluster(
-        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=60
-    ) as cluster:
-        yield cluster.scheduler_address
+    with (
+        LocalCluster(n_workers=0, dashboard_address=None, silence_logs=60) as scheduler,
+        _kept(scheduler.scheduler_address, workers),
+    ):
+        if workers:
+            with Client(scheduler.scheduler_address, set_as_default=False) as client:
+                client.wait_for_workers(workers, timeout=world.HANGS)
+        yield scheduler.scheduler_address
+
+
+@contextmanager
+def _kept(address: str, count: int) -> Iterator[None]:
+    """Keep so many workers running.
+
+    Dask's own nannies are not used: one whose worker is killed while it starts may not start another.
+    """
+    with world.folder() as root:
+        log, ended = root.parent / "log", threading.Event()
+
+        def keep() -> None:
+            running = [_worker(address, NAMES, log) for _ in range(count)]
+            while not ended.wait(0.1):
+                running = [each if each.poll() is None else _worker(address, NAMES, log) for each in running]
+            for each in running:
+                each.kill()
+                each.wait()
+
+        keeper = threading.Thread(target=keep)
+        keeper.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            keeper.join()
 
 
 def _nothing_left(tally: Tally, store: Store, where: str) -> None:
@@ -161,13 +192,18 @@ class Killer:
     def join(self) -> None:
         self._timer.join()
         deadline = time.monotonic() + world.HANGS
-        while time.monotonic() < deadline:
-            with suppress(Exception):
-                pids = self._client.run(os.getpid, on_error="ignore")
-                if len(pids) == 4 and self._pid not in pids.values():
-                    break
+        while not self._whole():
+            if time.monotonic() > deadline:
+                raise RuntimeError(f"four workers were not there {world.HANGS:.0f} s after one was killed")
             time.sleep(0.1)
         self._client.close()
+
+    def _whole(self) -> bool:
+        """Say whether there are four workers again, without the killed one."""
+        with suppress(Exception):  # the one that was killed may be asked, too
+            pids = self._client.run(os.getpid, on_error="ignore")
+            return len(pids) == 4 and self._pid not in pids.values()
+        return False
 
 
 def _killed_schedulers(tally: Tally, trials: int) -> None:
@@ -199,7 +235,7 @@ def _outside(folder: Path) -> Iterator[tuple[str, "subprocess.Popen[bytes]"]]:
             [sys.executable, "-m", "distributed.cli.dask_scheduler", *options], stdout=log, stderr=log, cwd=PROJECT
         )
         address = _address(file)
-        worker = _worker(address, PROJECT / "build" / "names", folder / "worker")
+        worker = _worker(address, NAMES, folder / "worker")
         try:
             yield address, scheduler
         finally:

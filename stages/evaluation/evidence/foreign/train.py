@@ -6,7 +6,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from semidense.stages.evaluation.evidence.foreign.declaration import OF_CELLS, ForeignNetParams, OfForeignSamples
-from semidense.stages.evaluation.evidence.net import EvidenceNet
+from semidense.stages.evaluation.evidence.foreign.net import ForeignNet
 from semidense.stages.learning.parameters import initialise, to_vector
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import fit
@@ -30,9 +30,9 @@ def train_foreign_net(params: ForeignNetParams, inputs: OfForeignSamples, monito
     known = torch.from_numpy(np.concatenate([scene["features"] for scene in scenes]))
     error = np.concatenate([scene["error"] for scene in scenes])
     right = torch.from_numpy((error <= params.tolerance).astype(np.float32))
-    net = EvidenceNet(known.shape[1])
+    net = ForeignNet()
     initialise(net, params.seed)
-    net.measure(known)
+    net.keep(known.mean(dim=0), known.std(dim=0, correction=0))
 
     def loss(step: int, shard: int) -> Tensor:
         rng = np.random.default_rng((params.seed, step, shard))

@@ -12,6 +12,7 @@ from semidense.stages.evaluation.evidence.declaration import (
     EVIDENCE_CONFIDENCE,
     OF_MAP,
     OF_NEIGHBOURS,
+    REACH,
     EvidenceConfidenceParams,
 )
 from semidense.stages.evaluation.evidence.features import of_whole_map
@@ -97,17 +98,16 @@ def test_what_costs_say_around_a_pixel_is_told_of_those_with_a_disparity() -> No
     assert np.allclose(around, np.float32([3, 3, 1, 1, 1, 1])[:, None, None], atol=1e-4)
 
 
-def require_dropped(folder: str, said: dict[str, float]) -> None:
-    """Fail if a set of weights is sure of a pixel, away from the hole or beside it."""
+def scored(folder: str, said: dict[str, float]) -> np.ndarray:
+    """Return what a set of weights answers, of pixels away from the hole and beside it."""
     weights, given = Path(semidense.stages.weights.__file__).parent / folder, with_a_hole(said)
     nets = {
         product: read_weights(product, (weights / f"{product}.safetensors").read_bytes())
         for product in ("evaluation_net", "evidence_net")
     }
-    known = of_whole_map(given["images"], given["disparity"], nets["evaluation_net"], "float32")
+    known = of_whole_map(given["images"], given["disparity"], nets["evaluation_net"], "float32", REACH)
     made = sigmoid(weigh(nets["evidence_net"]["parameters"], known))
-    assert made[:, 60:80].max() < 0.9
-    assert made[:, 30:45].max() < 0.9
+    return np.concatenate([made[:, 30:45], made[:, 60:80]], axis=1)
 
 
 @pytest.mark.parametrize("folder", ["", "general/"])
@@ -119,19 +119,41 @@ def test_what_is_dropped_is_dropped_beside_a_hole_too(folder: str, difference: f
     say something else.
     """
     margins = {"aggregated_margin": 0.5, "single_margin": 0.1, "single_excess": 3, "left_right": difference}
-    require_dropped(folder, {**margins, "aggregated_flatness": 0.1, "single_flatness": 0.3, "single_minima": 6})
+    said = {**margins, "aggregated_flatness": 0.1, "single_flatness": 0.3, "single_minima": 6}
+    assert scored(folder, said).max() < 0.9
 
 
-@pytest.mark.parametrize(
-    "folder",
-    ["", pytest.param("general/", marks=pytest.mark.xfail(strict=True, reason="0.94 to 0.997: a fault of these nets"))],
-)
+@pytest.mark.parametrize("folder", ["", "general/"])
 @pytest.mark.parametrize("margin", [0.5, 2, 8])
 def test_what_costs_cannot_say_together_is_dropped(folder: str, margin: float) -> None:
     """Nothing stands out or the right view differs, and yet no other disparity is nearly as good."""
-    require_dropped(
-        folder, {**dict.fromkeys(("aggregated_margin", "single_margin", "left_right"), margin), "agrees": 1}
-    )
+    said = {**dict.fromkeys(("aggregated_margin", "single_margin", "left_right"), margin), "agrees": 1}
+    assert scored(folder, said).max() < 0.9
+
+
+SOUND = {
+    "aggregated_margin": 38,
+    "single_margin": 6,
+    "single_cost": -8,
+    "agrees": 1,
+    "aggregated_flatness": 0.01,
+    "single_flatness": 0.01,
+    "single_minima": 1,
+}
+"""What costs say of a pixel that is right."""
+CONTRADICTIONS = {
+    "the right view differs": {"left_right": 8},
+    "nothing stands out": {"aggregated_margin": 1, "single_margin": 0.1},
+    "the single costs differ": {"agrees": 0, "single_excess": 8},
+    "many minima": {"single_minima": 8, "single_flatness": 0.3, "aggregated_flatness": 0.1},
+}
+
+
+@pytest.mark.parametrize("folder", ["", "general/"])
+def test_one_kind_of_bad_evidence_is_enough_whatever_the_others_say(folder: str) -> None:
+    assert np.median(scored(folder, SOUND)) > 0.9
+    found = {name: scored(folder, {**SOUND, **said}).max() for name, said in CONTRADICTIONS.items()}
+    assert max(found.values()) < 0.9, found
 
 
 def test_the_evaluation_net_answers_at_every_fourth_pixel() -> None:
@@ -162,7 +184,7 @@ def test_a_tile_begins_where_the_evaluation_net_answers(stage: Stage) -> None:
 
 def test_the_stage_weighs_the_features_of_the_whole_map() -> None:
     given = products()
-    known = of_whole_map(given["images"], given["disparity"], given["evaluation_net"], "float32")
+    known = of_whole_map(given["images"], given["disparity"], given["evaluation_net"], "float32", REACH)
     odds = weigh(given["evidence_net"]["parameters"], known)
     made = whole(EVIDENCE_CONFIDENCE, PARAMS, given, DIMS)
     assert list(made) == [output.name for output in EVIDENCE_CONFIDENCE.outputs]

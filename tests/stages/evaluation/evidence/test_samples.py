@@ -1,36 +1,49 @@
 import numpy as np
 import pytest
 
-from semidense.stages.evaluation.evidence.declaration import EVIDENCE_SAMPLES, EvidenceSamplesParams
+from semidense.stages.evaluation.evidence.declaration import EVIDENCE_SAMPLES, REACH, EvidenceSamplesParams
 from semidense.stages.evaluation.evidence.features import of_whole_map
-from semidense.stages.evaluation.evidence.samples import draw_evidence_samples
+from semidense.stages.evaluation.evidence.samples import compute_evidence_samples
 from semidense.stages.stage import StageError
 from tests.stages.evaluation.evidence.test_train import evident_scenes
 
-PARAMS = EvidenceSamplesParams(pixels=100, precision="float32")
+PARAMS = EvidenceSamplesParams(precision="float32")
 
 
-def test_makes_what_it_declares_and_one_seed_makes_it_again() -> None:
-    one, again = (draw_evidence_samples(PARAMS, evident_scenes()[0]) for _ in range(2))
-    assert list(one) == [output.name for output in EVIDENCE_SAMPLES.outputs]
-    assert all(np.array_equal(one[name], again[name]) and one[name].dtype == np.float32 for name in one)
-    other = draw_evidence_samples(PARAMS.model_copy(update={"seed": 1}), evident_scenes()[0])
-    assert not np.array_equal(one["error"], other["error"])
-
-
-def test_all_pixels_of_known_truth_are_drawn_once_where_there_are_few() -> None:
+def test_makes_what_it_declares_what_is_known_and_which_pixels_are_right() -> None:
     scene = evident_scenes()[0]
-    made = draw_evidence_samples(PARAMS.model_copy(update={"pixels": 10**6}), scene)
+    scene["disparity"]["disparity"][9, 9] = np.nan
+    made = compute_evidence_samples(PARAMS, scene)
+    declared = {output.name: output.dtype for output in EVIDENCE_SAMPLES.outputs}
+    assert declared == {name: str(array.dtype) for name, array in made.items()}
+    known = of_whole_map(scene["images"], scene["disparity"], scene["evaluation_net"], "float32")
+    assert made["features"].shape == (32, 20 + 2 * REACH, 24)
+    assert np.array_equal(made["features"][:, REACH:-REACH], known.astype(np.float16))
     error = np.abs(scene["disparity"]["disparity"] - scene["truth"]["disparity"])
-    known = np.isfinite(error)
-    stacked = of_whole_map(scene["images"], scene["disparity"], scene["evaluation_net"], "float32")
-    assert np.array_equal(np.sort(made["error"]), np.sort(error[known]))
-    rows = {tuple(row) for row in np.column_stack([made["features"], made["error"]]).tolist()}
-    assert rows == {tuple(row) for row in np.column_stack([stacked[:, known].T, error[known]]).tolist()}
+    assert np.array_equal(made["right"], np.where(np.isfinite(error), error <= 1, -1))
+    assert set(np.unique(made["right"])) == {-1, 0, 1}
+
+
+@pytest.mark.parametrize(("known", "right"), [(1.0, False), (0.3, True)])
+def test_a_sparse_truth_is_not_held_to_the_last_half_pixel(known: float, right: bool) -> None:
+    scene = evident_scenes()[0]
+    is_known = np.random.default_rng(0).random((20, 24)) < known
+    scene["truth"]["disparity"] = np.where(
+        is_known, scene["disparity"]["disparity"] + np.float32(1.2), np.float32(np.nan)
+    )
+    labels = compute_evidence_samples(PARAMS, scene)["right"]
+    assert set(labels[labels != -1].tolist()) == {int(right)}
+
+
+def test_a_scene_without_anything_to_judge_is_refused() -> None:
+    scene = evident_scenes()[0]
+    scene["truth"]["disparity"][:] = np.nan
+    with pytest.raises(StageError, match="no pixel with a disparity and a known truth"):
+        compute_evidence_samples(PARAMS, scene)
 
 
 def test_a_map_without_evidence_is_refused() -> None:
     scene = evident_scenes()[0]
     scene["disparity"] = {"disparity": scene["disparity"]["disparity"]}
     with pytest.raises(StageError, match=r"set use\.disparity=aggregated"):
-        draw_evidence_samples(PARAMS, scene)
+        compute_evidence_samples(PARAMS, scene)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from semidense.stages.evaluation.evidence.confidence import weigh
+from semidense.stages.evaluation.evidence.foreign.confidence import weigh
 from semidense.stages.evaluation.evidence.foreign.declaration import (
     FEATURES,
     FOREIGN_NET,
