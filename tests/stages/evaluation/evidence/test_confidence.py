@@ -151,8 +151,9 @@ CONTRADICTIONS = {
 
 @pytest.mark.parametrize("folder", ["", "general/"])
 def test_one_kind_of_bad_evidence_is_enough_whatever_the_others_say(folder: str) -> None:
-    assert np.median(scored(folder, SOUND)) > 0.9
-    found = {name: scored(folder, {**SOUND, **said}).max() for name, said in CONTRADICTIONS.items()}
+    away = slice(15, None)  # columns that the hole is not beside
+    assert scored(folder, SOUND)[:, away].min() > 0.9
+    found = {name: scored(folder, {**SOUND, **said})[:, away].max() for name, said in CONTRADICTIONS.items()}
     assert max(found.values()) < 0.9, found
 
 
