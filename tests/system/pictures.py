@@ -62,11 +62,13 @@ def main(
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         write_unrectified(folder / "photos")
-        for command in (*COMMANDS, *([("compare", dataset, *COMPARE)] if dataset else [])):
+        for command in COMMANDS:
             run(command, folder)
-        with chromium() as browser:
+        with chromium() as browser:  # before the cache holds other scenes: the viewer shows the first one
             photograph_report(browser, folder)
             photograph_viewer(browser, folder)
+        if dataset:
+            run(("compare", dataset, *COMPARE), folder)
         for name, source in PICTURES.items():
             if (folder / source).exists():
                 save_small(folder / source, output / name)
