@@ -30,12 +30,21 @@ def names(chains: Sequence[Chain]) -> list[str]:
     """
     settings = [dict(_chosen(chain)) for chain in chains]
     every = dict.fromkeys(name for each in settings for name in each if _in_all(name, chains))
-    differing = [name for name in every if len({each.get(name) for each in settings}) > 1]
+    differing = [name for name in every if _differs(name, settings)]
     plain = [name for name in differing if not name.endswith(".shipped")]
     heads = [_head(chain, _told(each, plain)) for chain, each in zip(chains, settings, strict=True)]
     if len(set(heads)) < len(heads):
         heads = [_head(chain, _told(each, differing)) for chain, each in zip(chains, settings, strict=True)]
     return [f"{head} - {_when(chain)}" for head, chain in zip(heads, chains, strict=True)]
+
+
+def _differs(name: str, settings: Sequence[Mapping[str, str]]) -> bool:
+    """Return whether a setting tells configurations apart.
+
+    The machine fills in the precision that nobody set: it is none of a stage that only some of them have.
+    """
+    values = {each.get(name) for each in settings}
+    return len(values - {None} if name.endswith(".precision") else values) > 1
 
 
 def _told(settings: Mapping[str, str], names: Sequence[str]) -> list[str]:

@@ -41,6 +41,17 @@ def test_a_setting_that_differs_is_told() -> None:
     assert shown(ROBUST, once) == ["robust, fast", "robust, fast, aggregated.passes=1"], "a default is told, too"
 
 
+def test_a_precision_that_nobody_set_is_told_only_where_two_differ() -> None:
+    made, other = (
+        ROBUST | {"confidence": entry("evidence_confidence", precision=precision)}
+        for precision in ("float32", "bfloat16")
+    )
+    assert shown(PAPER, made) == ["paper, exact", "robust, fast"]
+    assert shown(made, other) == [
+        f"robust, fast, evidence_confidence.precision={precision}" for precision in ("float32", "bfloat16")
+    ]
+
+
 def test_the_hash_of_weights_is_told_only_where_nothing_else_differs() -> None:
     one, other = ({"evaluation_net": entry("evaluation_net", shipped=digest * 16)} for digest in ("abcd", "ef01"))
     of_robust = {"evaluation_net": entry("evaluation_net", shipped="ef01" * 16, steps=800)}
