@@ -41,7 +41,7 @@ def names(chains: Sequence[Chain]) -> list[str]:
 def _differs(name: str, settings: Sequence[Mapping[str, str]]) -> bool:
     """Return whether a setting tells configurations apart.
 
-    The machine fills in the precision that nobody set: it is none of a stage that only some of them have.
+    A precision does so only if two configurations have different ones: the machine fills it in if nobody sets it.
     """
     values = {each.get(name) for each in settings}
     return len(values - {None} if name.endswith(".precision") else values) > 1
