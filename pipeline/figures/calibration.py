@@ -19,7 +19,7 @@ _MARKED = (0.5, 0.8, 0.9, 0.95, 0.99, 0.999)
 def draw_calibration(figure: Figure, dataset: xr.Dataset) -> None:
     """Draw the reliability in held-out scenes with the chosen map, and what R keeps and how much of it is wrong."""
     figure.set_size_inches(11, 5)
-    table = Table.of({name: dataset[name].values for name in ("right", "wrong", "tolerance")})
+    table = Table.of({name: dataset[name].values for name in ("right", "wrong")})
     left, right = figure.subplots(1, 2)
     _draw_reliability(left, table, dataset)
     _draw_choices(right, table)

@@ -126,7 +126,7 @@ class Match:
         if self.wishes.max_error is None or found is None:
             return None
         calibration = self.result.store.read(found.key)
-        return outcome(Table.of(calibration), calibration["log_odds"], self.wishes.max_error)
+        return outcome(Table.of(calibration), calibration["log_odds"], self.wishes.max_error, calibration["tolerance"])
 
     @property
     def expected_error(self) -> float | None:

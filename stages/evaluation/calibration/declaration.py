@@ -52,7 +52,7 @@ CALIBRATION = Stage(
         Output("wrong", ("scene", "bin"), "int64", "1", "wrong pixels by confidence"),
         Output("score", ("map",), "float64", "1", "Brier score on scenes not fitted to: none, Platt, isotonic"),
         Output("log_odds", ("edge",), "float64", "1", "calibrated log-odds at the edges of the bins"),
-        Output("tolerance", ("all",), "float64", "px", "largest error of a right disparity"),
+        Output("tolerance", ("scene",), "float64", "px", "largest error of a right disparity of the scene"),
     ),
     compute="semidense.stages.evaluation.calibration.stage:compute_calibration",
     params=CalibrationParams,

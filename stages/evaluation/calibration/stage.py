@@ -36,16 +36,11 @@ def compute_calibration(params: CalibrationParams, inputs: ScoredMaps) -> Calibr
     """
     scores_of = by_scene(inputs["confidence"], "confidence")
     scenes = zip(scores_of, inputs["disparity"], inputs["truth"], strict=True)
-    counts = [
-        tally(
-            confidence["confidence"],
-            disparity["disparity"],
-            truth["disparity"],
-            params.tolerance if is_dense(truth["disparity"]) else params.sparse_tolerance,
-        )
-        for confidence, disparity, truth in scenes
-    ]
-    table = Table(np.stack([right for right, _ in counts]), np.stack([wrong for _, wrong in counts]), params.tolerance)
+    counts, tolerances = [], []
+    for confidence, disparity, truth in scenes:
+        tolerances.append(params.tolerance if is_dense(truth["disparity"]) else params.sparse_tolerance)
+        counts.append(tally(confidence["confidence"], disparity["disparity"], truth["disparity"], tolerances[-1]))
+    table = Table(np.stack([right for right, _ in counts]), np.stack([wrong for _, wrong in counts]))
     folds = np.array(params.fold_of_scene or (), np.intp)
     if folds.size != len(counts) or len(np.unique(folds)) < 2:
         raise StageError(f"{folds.size} folds were given for {len(counts)} scenes: one a scene, and two different ones")
@@ -55,7 +50,7 @@ def compute_calibration(params: CalibrationParams, inputs: ScoredMaps) -> Calibr
         "wrong": table.wrong,
         "score": np.array(scores),
         "log_odds": FITS[MAPS[int(np.argmin(scores))]](table),
-        "tolerance": np.array([params.tolerance]),
+        "tolerance": np.array(tolerances),
     }
 
 

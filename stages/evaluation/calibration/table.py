@@ -4,7 +4,7 @@ A table has a row a scene and counts pixels by the log-odds of their confidence.
 many of its pixels have a known truth.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,21 +39,19 @@ class Table:
     Attributes:
         right: (scene, bin) counts of right pixels.
         wrong: (scene, bin) counts of wrong ones.
-        tolerance: error up to which a pixel is right, px.
     """
 
     right: NDArray[np.int64]
     wrong: NDArray[np.int64]
-    tolerance: float = 1.0
 
     @classmethod
     def of(cls, calibration: Arrays) -> "Table":
         """Return the table of the product ``calibration``."""
-        return cls(calibration["right"], calibration["wrong"], float(calibration["tolerance"][0]))
+        return cls(calibration["right"], calibration["wrong"])
 
     def scenes(self, chosen: NDArray[np.bool_]) -> "Table":
         """Return the table of some of the scenes."""
-        return replace(self, right=self.right[chosen], wrong=self.wrong[chosen])
+        return Table(self.right[chosen], self.wrong[chosen])
 
     @property
     def shares(self) -> tuple[Floats, Floats]:
@@ -111,13 +109,13 @@ class Outcome(NamedTuple):
         error: share of wrong pixels among the kept, mean over the scenes that keep any; NaN if none does.
         kept: share of the pixels that is kept, mean over the scenes.
         scenes: how many scenes there are.
-        tolerance: error above which a pixel is wrong, px.
+        tolerances: errors above which a pixel is wrong, px, rising; a second one is that of sparse truths.
     """
 
     error: float
     kept: float
     scenes: int
-    tolerance: float
+    tolerances: tuple[float, ...]
 
     @property
     def words(self) -> str:
@@ -125,19 +123,22 @@ class Outcome(NamedTuple):
         scenes = f"{self.scenes} training scenes that the networks had not seen"
         if not self.kept:
             return f"in {scenes} no pixel was sure enough for that error"
+        least, *larger = self.tolerances
+        sparse = f" ({larger[-1]:g} px where a laser measured the truth)" if larger else ""
         return (
             f"in {scenes} the same wish kept {100 * self.kept:.3g} % of the pixels, {100 * self.error:.3g} % of them "
-            f"wrong by more than {self.tolerance:g} px"
+            f"wrong by more than {least:g} px{sparse}"
         )
 
 
-def outcome(table: Table, mapped: Floats, max_error: float) -> Outcome:
+def outcome(table: Table, mapped: Floats, max_error: float, tolerance: Floats) -> Outcome:
     """Return what comes of keeping in each scene as many pixels as are expected to keep the error.
 
     Args:
         table: of scenes that the networks have not seen.
         mapped: calibrated log-odds at ``EDGES``.
         max_error: mean probability of being wrong among the kept, at most, in (0, 1).
+        tolerance: (scene,) error up to which a pixel of the scene was counted as right, px.
     """
     pixels = table.right + table.wrong
     sums, wrong = _above(pixels), _above(table.wrong)
@@ -148,7 +149,8 @@ def outcome(table: Table, mapped: Floats, max_error: float) -> Outcome:
         kept.append(sums[scene, least] / max(sums[scene, 0], 1) if reached.any() else 0.0)
         if reached.any():
             errors.append(wrong[scene, least] / sums[scene, least])
-    return Outcome(float(np.mean(errors)) if errors else float("nan"), float(np.mean(kept)), len(kept), table.tolerance)
+    tolerances = tuple(np.unique(tolerance).tolist())
+    return Outcome(float(np.mean(errors)) if errors else float("nan"), float(np.mean(kept)), len(kept), tolerances)
 
 
 def told(R: float) -> str:

@@ -86,7 +86,7 @@ def table_file(folder: Path, wrong: int) -> None:
         "wrong": counts,
         "score": np.array([0.2, 0.1, 0.3]),
         "log_odds": 0.5 * EDGES,
-        "tolerance": np.array([1.0]),
+        "tolerance": np.ones(3),
     }
     (folder / "calibration.safetensors").write_bytes(save_table(arrays, {}))
     shipped.weights_digest.cache_clear()

@@ -34,8 +34,9 @@ def test_a_sparse_truth_is_not_held_to_the_last_half_pixel() -> None:
     given, params = scenes(2), CalibrationParams(fold_of_scene=(0, 1))
     truth = np.full((60, 70), 5.2, np.float32)  # 1.2 px from the right disparities
     sparse = np.where(np.random.default_rng(0).random(truth.shape) < 0.3, truth, np.float32(np.nan))
-    right = compute_calibration(params, {**given, "truth": [{"disparity": truth}, {"disparity": sparse}]})["right"]
-    assert right[0].sum() == 0 < right[1].sum()
+    made = compute_calibration(params, {**given, "truth": [{"disparity": truth}, {"disparity": sparse}]})
+    assert made["right"][0].sum() == 0 < made["right"][1].sum()
+    assert made["tolerance"].tolist() == [1.0, 1.25]
 
 
 def test_a_sound_confidence_is_left_nearly_as_it_is_and_an_oversure_one_is_corrected() -> None:

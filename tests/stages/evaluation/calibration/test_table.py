@@ -66,26 +66,34 @@ def test_a_wanted_error_by_hand() -> None:
     mapped[: HALF + 1] = np.log(0.8 / 0.2)
     mapped[:11] = 0.0
     easy, hard = {5: (1, 1), 20: (2, 0), HALF + 1: (6, 0)}, {5: (0, 8), 20: (1, 1)}
-    found = outcome(table(easy, hard), mapped, 0.21)
+    found = outcome(table(easy, hard), mapped, 0.21, np.ones(2))
     # Easy: 1.4 of 10 are expected to be wrong, so all are kept; of the hard one, 0.4 of its two surer pixels.
     assert (found.error, found.kept, found.scenes) == (pytest.approx((0.1 + 0.5) / 2), pytest.approx((1 + 0.2) / 2), 2)
-    strict = outcome(table(easy, hard), mapped, 0.1)
+    strict = outcome(table(easy, hard), mapped, 0.1, np.ones(2))
     assert (strict.error, strict.kept) == (0, pytest.approx(0.8 / 2)), "the hard scene keeps nothing"
 
 
 def test_without_a_sure_pixel_nothing_is_kept() -> None:
-    found = outcome(table({HALF: (9, 1)}), np.zeros(BINS + 1), 0.1)
+    found = outcome(table({HALF: (9, 1)}), np.zeros(BINS + 1), 0.1, np.ones(1))
     assert found.kept == 0 and np.isnan(found.error)
     assert found.words == "in 1 training scenes that the networks had not seen no pixel was sure enough for that error"
 
 
-def test_the_words_say_what_the_wish_came_to() -> None:
-    given = table({HALF: (49, 1)})
-    assert outcome(given, np.full(BINS + 1, 4.0), 0.05).words == (
-        "in 1 training scenes that the networks had not seen the same wish kept 100 % of the pixels, 2 % of them "
-        "wrong by more than 1 px"
+@pytest.mark.parametrize(
+    ("tolerance", "words"),
+    [
+        ([1.0, 1.0], "1 px"),
+        ([1.0, 1.25], "1 px (1.25 px where a laser measured the truth)"),
+        ([1.25, 1.25], "1.25 px"),
+    ],
+)
+def test_the_words_say_what_the_wish_came_to(tolerance: list[float], words: str) -> None:
+    given = table({HALF: (49, 1)}, {HALF: (49, 1)})
+    assert outcome(given, np.full(BINS + 1, 4.0), 0.05, np.array(tolerance)).words == (
+        "in 2 training scenes that the networks had not seen the same wish kept 100 % of the pixels, 2 % of them "
+        f"wrong by more than {words}"
     )
 
 
 def test_a_scene_without_truth_keeps_nothing() -> None:
-    assert outcome(table({HALF: (1, 0)}, {}), np.full(BINS + 1, 4.0), 0.5).kept == 0.5
+    assert outcome(table({HALF: (1, 0)}, {}), np.full(BINS + 1, 4.0), 0.5, np.ones(2)).kept == 0.5
