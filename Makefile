@@ -61,15 +61,23 @@ evidence: $(READY)  ## DATA=DIR: train what weighs the evidence of indoor aggreg
 
 train-general: $(READY)  ## DATA=DIR: train the preset robust on DIR/middlebury and DIR/kitti2012, and put its weights in place
 	@test -n "$(DATA)" || { echo "make train-general: say where the data is: make train-general DATA=DIR"; exit 2; }
-	for product in descriptor_net evidence_net evaluation_net calibration; do \
+	for product in descriptor_net evidence_net evaluation_net; do \
 		$(BIN)/pipeline run middlebury:$(DATA)/middlebury+kitti2012:$(DATA)/kitti2012 --preset robust --train \
 			--upto $$product --output build/general/$$product || exit; \
+	done
+	for px in 1 2 3; do \
+		$(BIN)/pipeline run middlebury:$(DATA)/middlebury+kitti2012:$(DATA)/kitti2012 --preset robust --train \
+			--upto calibration --set calibration.tolerance=$$px --output build/general/$$px || exit; \
 	done
 	for net in descriptor_net evidence_net evaluation_net; do \
 		cp build/general/$$net/$$net.safetensors stages/weights/general/$$net.safetensors; \
 	done
-	cp build/general/calibration/calibration.safetensors \
+	cp build/general/1/calibration.safetensors \
 		stages/weights/general/calibration.evidence_confidence.aggregated.fast.safetensors
+	for px in 2 3; do \
+		cp build/general/$$px/calibration.safetensors \
+			stages/weights/general/calibration.evidence_confidence.aggregated.fast.$${px}px.safetensors; \
+	done
 
 foreign: $(READY)  ## DATA=DIR: train what scores maps of other matchers, and put its weights in place
 	@test -n "$(DATA)" || { echo "make foreign: say where the Middlebury sets are: make foreign DATA=DIR"; exit 2; }

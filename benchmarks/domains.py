@@ -1,10 +1,12 @@
 """How maps and confidence do in several worlds beside SGBM: ``python -m benchmarks.domains DATASET ...``.
 
 Each scene is matched by a preset with the package's weights, and by OpenCV's SGBM. The tables have the mean over the
-scenes of each data set: what is wrong in the dense map, at SGBM's density and at R = 0.9; what comes of a wanted error.
+scenes of each data set: what is wrong in the dense map, at SGBM's density and at R = 0.9; what comes of a wanted error,
+which counts a disparity as right within 1, 2 or 3 px (the calibration has a table for each).
 Pixels that both views see count, a pixel without a disparity is wrong in a dense map. Where SGBM keeps more pixels than
-have a confidence above 0, the rest is filled up at random. A data set in another layout is described by a small file
-(``toml:FILE``).
+have a confidence above 0, the rest is filled up at random. The expected calibration error (ECE) is of the pixels with a
+confidence above 0: a veto sets pixels to 0 to keep them out, which is no probability. A data set in another layout is
+described by a small file (``toml:FILE``).
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,15 +24,15 @@ from benchmarks.harness import write
 from semidense.datasets import open_dataset
 from semidense.pipeline.api import Task, carry_out
 from semidense.pipeline.execution.progress import ProgressWatch
+from semidense.pipeline.execution.watch import Watch
+from semidense.pipeline.plan.shipped_weights import TOLERANCES
 from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.results.result import Result
 from semidense.stages.evaluation.filtering import threshold_for_error
 from semidense.stages.metrics.confidence import Ranking
 
-THRESHOLDS = (1.0, 2.0, 3.0)
-"""Errors above which a disparity is wrong, px."""
 WISHES = (0.01, 0.02, 0.05)
-"""Shares of wrong pixels that are asked for; the calibration calls a pixel wrong that is off by more than 1 px."""
+"""Shares of wrong pixels that are asked for."""
 ECE_BINS = 10
 Flags = NDArray[np.bool_]
 Values = NDArray[np.float32]
@@ -47,18 +49,16 @@ def main(
     found = {spec: _figures(Task(spec, settings=setting or (), preset=preset, cache=cache)) for spec in dataset}
     write("domains", {"preset": preset, "settings": setting or [], "datasets": found})
     _print(
-        "% wrong: dense, at SGBM's density, R = 0.9", found, [f"{name}>{t:g}" for t in THRESHOLDS for name in _SHARES]
+        "% wrong: dense, at SGBM's density, R = 0.9", found, [f"{name}>{t:g}" for t in TOLERANCES for name in _SHARES]
     )
-    _print(
-        "what is kept, and the order",
-        found,
-        ["scenes", "kept, SGBM", "kept, R = 0.9", "AUC", *(f"ECE > {limit:g} px" for limit in THRESHOLDS)],
-    )
+    errors = [f"{name} > {limit:g} px" for name in _ECE for limit in TOLERANCES]
+    _print("what is kept, and the order", found, ["scenes", "kept, SGBM", "kept, R = 0.9", "AUC", *errors])
     _print("a wanted error: % wrong of % kept", found, [f"{w:g} {what}" for w in WISHES for what in _KEPT])
 
 
+_ECE = ("ECE", "ECE a scene", "ECE with vetoed")
 _SHARES = ("dense ", "SGBM dense ", "at its density ", "SGBM ", "R = 0.9 ")
-_KEPT = ("kept", *(f"wrong > {limit:g} px" for limit in THRESHOLDS))
+_KEPT = tuple(f"{what} {limit:g} px" for limit in TOLERANCES for what in ("kept, within", "wrong, >"))
 
 
 def _print(title: str, found: Mapping[str, Figures], names: Sequence[str]) -> None:
@@ -69,21 +69,30 @@ def _print(title: str, found: Mapping[str, Figures], names: Sequence[str]) -> No
 
 
 def _figures(task: Task) -> Figures:
-    """Return the mean of each figure over the scenes with a truth."""
+    """Return the mean of each figure over the scenes with a truth, and the calibration error of all their pixels."""
     scenes = [scene for scene in open_dataset(str(task.dataset)).scenes if scene.has_truth]
-    request = Request(
-        open_dataset(str(task.dataset)).select([scene.name for scene in scenes]), {"": task.configuration()},
-        "calibrated_confidence", also=("confidence", "disparity", "truth", "sgm"),
-    )  # fmt: skip
+    chosen = open_dataset(str(task.dataset)).select([scene.name for scene in scenes])
+
+    def made(tolerance: float, watch: Watch) -> Result:
+        config = task.and_settings([f"calibration.tolerance={tolerance:g}"]).configuration()
+        also = ("confidence", "disparity", "truth", "sgm")
+        return carry_out(task, Request(chosen, {"": config}, "calibrated_confidence", also=also), (), watch, None, None)
+
     with ProgressWatch() as watch:
-        result = carry_out(task, request, (), watch, None, None)
-    rows = [_of_scene(result, scene.name) for scene in scenes]
-    return {name: float(np.nanmean([row[name] for row in rows])) for name in rows[0]} | {"scenes": len(rows)}
+        results = {tolerance: made(tolerance, watch) for tolerance in TOLERANCES}
+    maps = [_Maps.of(results, scene.name) for scene in scenes]
+    rows = [_of_scene(each) for each in maps]
+    means = {name: float(np.nanmean([row[name] for row in rows])) for name in rows[0]}
+    errors = {name: value for limit in TOLERANCES for name, value in _calibration_errors(maps, limit).items()}
+    return means | errors | {"scenes": len(rows)}
 
 
 @dataclass(frozen=True)
 class _Maps:
-    """The maps of a scene, (y, x) each: disparities in px, scores in [0, 1], and the pixels that count."""
+    """The maps of a scene, (y, x) each: disparities in px, scores in [0, 1], and the pixels that count.
+
+    ``chance`` has a map for each tolerance.
+    """
 
     truth: Values
     mask: Flags
@@ -91,10 +100,11 @@ class _Maps:
     sgm: Values
     sgm_dense: Values
     score: Values
-    chance: Values
+    chance: Mapping[float, Values]
 
     @classmethod
-    def of(cls, result: Result, scene: str) -> "_Maps":
+    def of(cls, results: Mapping[float, Result], scene: str) -> "_Maps":
+        result = results[TOLERANCES[0]]
         truth, sgm = result.open("truth", scene), result.open("sgm", scene)
         return cls(
             truth["disparity"].values,
@@ -103,7 +113,7 @@ class _Maps:
             sgm["disparity"].values,
             sgm["dense"].values,
             result.open("confidence", scene)["confidence"].values,
-            result.open("calibrated_confidence", scene)["confidence"].values,
+            {limit: of.open("calibrated_confidence", scene)["confidence"].values for limit, of in results.items()},
         )
 
     @property
@@ -115,27 +125,45 @@ class _Maps:
         """Return where a map is right."""
         return np.abs(disparity - self.truth) <= limit
 
+    def gaps(self, limit: float, among: Flags) -> NDArray[np.float64]:
+        """Return by how much the probabilities of some pixels exceed what is right of them.
+
+        (tenth + 1,) sums: one for each tenth of probability, and the number of pixels.
+        """
+        chosen = self.mask & among
+        chance, right = self.chance[limit][chosen], self.right(self.own, limit)[chosen]
+        tenths = np.minimum((chance * ECE_BINS).astype(int), ECE_BINS - 1)
+        return np.append(np.bincount(tenths, chance - right, ECE_BINS), chance.size)
+
     def wrong(self, disparity: Values, limit: float, among: Flags | None = None) -> float:
         """Return the share of wrong pixels among some of those that count, %; NaN of no pixels."""
         chosen = self.mask if among is None else self.mask & among
         return 100 * float(1 - self.right(disparity, limit)[chosen].mean()) if chosen.any() else float("nan")
 
 
-def _of_scene(result: Result, scene: str) -> Figures:
-    maps = _Maps.of(result, scene)
+def _of_scene(maps: _Maps) -> Figures:
     kept, ranking = maps.score >= np.float32(0.9), Ranking.of(maps.score[maps.mask])
     right = maps.right(maps.own, 1)[maps.mask]
     return {
         "kept, SGBM": 100 * maps.sgm_share,
         "kept, R = 0.9": 100 * float(kept[maps.mask].mean()),
         "AUC": ranking.auc(right),
-        **{
-            f"ECE > {limit:g} px": _calibration_error(maps.chance[maps.mask], maps.right(maps.own, limit)[maps.mask])
-            for limit in THRESHOLDS
-        },
-        **{name: value for limit in THRESHOLDS for name, value in _shares(maps, kept, ranking, limit).items()},
+        **{name: value for limit in TOLERANCES for name, value in _shares(maps, kept, ranking, limit).items()},
         **{name: value for wish in WISHES for name, value in _promised(maps, wish).items()},
     }
+
+
+def _calibration_errors(scenes: Sequence[_Maps], limit: float) -> Figures:
+    """Return the expected calibration error: of all pixels together, of a scene in the mean, with vetoed pixels."""
+    told = [maps.gaps(limit, maps.score > 0) for maps in scenes]
+    whole = [maps.gaps(limit, maps.mask) for maps in scenes]
+    a_scene = float(np.mean([_error(each) for each in told]))
+    errors = _error(np.sum(told, axis=0)), a_scene, _error(np.sum(whole, axis=0))
+    return {f"{name} > {limit:g} px": error for name, error in zip(_ECE, errors, strict=True)}
+
+
+def _error(gaps: NDArray[np.float64]) -> float:
+    return float(np.abs(gaps[:-1]).sum() / gaps[-1])
 
 
 def _shares(maps: _Maps, kept: Flags, ranking: Ranking, limit: float) -> Figures:
@@ -151,16 +179,12 @@ def _shares(maps: _Maps, kept: Flags, ranking: Ranking, limit: float) -> Figures
 
 
 def _promised(maps: _Maps, wish: float) -> Figures:
-    sure = maps.chance >= threshold_for_error(wish, maps.own, maps.chance)
-    wrong = {f"{wish:g} wrong > {limit:g} px": maps.wrong(maps.own, limit, sure) for limit in THRESHOLDS}
-    return {f"{wish:g} kept": 100 * float(sure[maps.mask].mean()), **wrong}
-
-
-def _calibration_error(chance: Values, right: Flags) -> float:
-    """Return the expected calibration error: how far the share of right pixels is from their probability, in bins."""
-    bins = np.minimum((chance * ECE_BINS).astype(int), ECE_BINS - 1)
-    gaps = [abs(float((chance - right)[bins == each].sum())) for each in range(ECE_BINS)]
-    return sum(gaps) / chance.size
+    found = {}
+    for limit, chance in maps.chance.items():
+        sure = chance >= threshold_for_error(wish, maps.own, chance)
+        found[f"{wish:g} kept, within {limit:g} px"] = 100 * float(sure[maps.mask].mean())
+        found[f"{wish:g} wrong, > {limit:g} px"] = maps.wrong(maps.own, limit, sure)
+    return found
 
 
 if __name__ == "__main__":

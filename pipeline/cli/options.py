@@ -110,7 +110,7 @@ MaxErrorOption = Annotated[
     typer.Option(
         "--max-error",
         help="Instead of --R: keep as many pixels as this share of errors allows, such as 2%. `match` needs a "
-        "calibration for it, which --preset paper has; `score` needs none.",
+        "calibration for it, which the presets have; `score` needs none.",
     ),
 ]
 ProductArgument = Annotated[str, typer.Argument(help="A product, such as costvolume, disparity or confidence.")]

@@ -15,6 +15,7 @@ class Wishes:
         max_error: share of wrong pixels to expect among the kept instead, in (0, 1), by the pair's own confidences and
             how often such were right in training scenes that the networks had not seen.
         calibrated: take and give the confidence as the probability that was measured there.
+        within: error up to which these two count a disparity as right, px; None for the configuration's.
         left_right: drop what the right view's map contradicts by more than ``tolerance`` px.
         tolerance: px.
         subpixel: move each disparity to the parabola's lowest point.
@@ -26,6 +27,7 @@ class Wishes:
     density: float | None = None
     max_error: float | None = None
     calibrated: bool = False
+    within: float | None = None
     left_right: bool = False
     tolerance: float = 1.0
     subpixel: bool = False
@@ -37,6 +39,8 @@ class Wishes:
         given = [name for name in ("R", "density", "max_error") if getattr(self, name) is not None]
         if len(given) > 1:
             raise UsageError(f"{' and '.join(given)} both say how much to keep; give one of them")
+        if self.within is not None and self.max_error is None and not self.calibrated:
+            raise UsageError("within says what a wanted error counts as right: give max-error or calibrated too")
 
     @property
     def product(self) -> str:
@@ -52,6 +56,7 @@ class Wishes:
     def settings(self) -> tuple[str, ...]:
         """The same as settings of the configuration."""
         given = {f"semidense.{name}": getattr(self, name) for name in ("R", "density", "max_error")}
+        given["calibration.tolerance"] = self.within
         if self.calibrated:
             given |= {"semidense.calibrated": True}
         if self.left_right:

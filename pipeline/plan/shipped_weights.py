@@ -1,6 +1,7 @@
 """Weights that stand in for trained networks and their calibration: those of the package, or a user's file."""
 
 import hashlib
+import re
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -10,6 +11,7 @@ from pathlib import Path
 from semidense.datasets.formats.files import user_path
 from semidense.pipeline.plan.config import Config
 from semidense.stages.catalog import STAGES
+from semidense.stages.evaluation.calibration.declaration import CalibrationParams
 from semidense.stages.matching.declaration import CostVolumeParams, Mode
 from semidense.stages.stage import Array, Inputs, Stage, StageError
 
@@ -19,6 +21,8 @@ _GENERAL = ("descriptor_net", "evaluation_net", "evidence_net", "calibration")
 """Products of the preset ``robust`` whose weights ``training.weights=general`` replaces."""
 _CALIBRATED = ("confidence", "disparity", "costvolume")
 """Products that a calibration holds for, unless another stage makes one of them."""
+TOLERANCES = (1.0, 2.0, 3.0)
+"""Errors up to which a disparity is right for a calibration of the package, px. The first one is the usual one."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,8 @@ def weights_of(config: Config, product: str) -> Weights:
         return own_weights(product, user_path(file))
     confidence, disparity, costvolume = (config.choice("use", name) or name for name in _CALIBRATED)
     mode, general = config.of("costvolume", CostVolumeParams).mode, config.training.weights == "general"
-    return shipped_weights(product, mode, confidence, disparity, costvolume, general)
+    tolerance = config.of("calibration", CalibrationParams).tolerance
+    return shipped_weights(product, mode, confidence, disparity, costvolume, general, tolerance)
 
 
 def shipped_weights(
@@ -75,13 +80,16 @@ def shipped_weights(
     disparity: str = _CALIBRATED[1],
     costvolume: str = _CALIBRATED[2],
     general: bool = False,
+    tolerance: float = TOLERANCES[0],
 ) -> Weights:
     """Return the package's weights of a product, for volumes of a mode and what makes confidence, map and costs.
+
+    ``tolerance``, px, is the largest error of a right disparity for a calibration.
 
     Raises:
         StageError: if this installation has none.
     """
-    name = weights_name(product, mode, confidence, disparity, costvolume, general)
+    name = weights_name(product, mode, confidence, disparity, costvolume, general, tolerance)
     return Weights(product, name, None, weights_digest(name))
 
 
@@ -108,10 +116,12 @@ def weights_name(
     disparity: str = _CALIBRATED[1],
     costvolume: str = _CALIBRATED[2],
     general: bool = False,
+    tolerance: float = TOLERANCES[0],
 ) -> str:
     """Return the name of a product's shipped weights, for volumes of a mode and what makes confidence, map and costs.
 
-    A calibration tells how often one kind of map is right at one kind of confidence, and nothing about other kinds.
+    A calibration tells how often one kind of map is right at one kind of confidence, within one tolerance, and nothing
+    about others.
 
     >>> weights_name("evaluation_net", "guided"), weights_name("matching_net", "guided")
     ('evaluation_net.guided', 'matching_net')
@@ -119,6 +129,8 @@ def weights_name(
     'general/descriptor_net'
     >>> weights_name("calibration", "fast", "evidence_confidence", "aggregated", general=True)
     'general/calibration.evidence_confidence.aggregated.fast'
+    >>> weights_name("calibration", "guided", tolerance=3)
+    'calibration.guided.3px'
     """
     others = [name for name in (confidence, disparity, costvolume) if name not in _CALIBRATED]
     own = general and product in _GENERAL
@@ -126,7 +138,12 @@ def weights_name(
         kind = [*others, mode]
     else:
         kind = ["guided"] if mode == "guided" and product in _LEARNT_FROM_MAPS and not own else []
-    return ("general/" if own else "") + ".".join([product, *kind])
+    name = ("general/" if own else "") + ".".join([product, *kind])
+    return _for_tolerance(name, tolerance) if product == "calibration" else name
+
+
+def _for_tolerance(name: str, tolerance: float) -> str:
+    return name if tolerance == TOLERANCES[0] else f"{name}.{tolerance:g}px"
 
 
 def weights_file(name: str) -> Traversable:
@@ -135,10 +152,14 @@ def weights_file(name: str) -> Traversable:
     Raises:
         StageError: if this installation has none.
     """
-    file = resources.files("semidense.stages") / "weights" / f"{name}.safetensors"
+    file = _file(name)
     if not file.is_file():
         raise StageError(_missing(name))
     return file
+
+
+def _file(name: str) -> Traversable:
+    return resources.files("semidense.stages") / "weights" / f"{name}.safetensors"
 
 
 @cache
@@ -163,6 +184,15 @@ def read_table(weights: Weights, _: Inputs) -> dict[str, Array]:
 
 def _missing(name: str) -> str:
     """Return what is missing and what to do about it."""
+    if found := re.fullmatch(r"(?P<others>.*?)\.(?P<px>\d[\d.e+-]*)px", name):
+        known = [f"{px:g}" for px in TOLERANCES if _file(_for_tolerance(found["others"], px)).is_file()]
+        if known:
+            return (
+                f"no calibration for errors of up to {found['px']} px comes with this installation: set "
+                f"calibration.tolerance (--within) to {' or '.join(known)}, or give a calibration of your own "
+                "(weights.calibration=FILE)"
+            )
+        name = found["others"]
     product, _, mode = name.rpartition("/")[2].partition(".")
     if product != "calibration":
         return f"no weights for {name} come with this installation: train them with --train"

@@ -76,9 +76,16 @@ def match(
         typer.Option(
             "--calibrated",
             help="Turn the confidence into a measured probability of being right, which --R then means; needs a "
-            "calibration, which --preset paper has.",
+            "calibration, which the presets have.",
         ),
     ] = False,
+    within: Annotated[
+        float | None,
+        typer.Option(
+            help="Error up to which --max-error and --calibrated count a disparity as right, px; --preset robust knows "
+            "1, 2 and 3. [default: 1]"
+        ),
+    ] = None,
     left_right: Annotated[
         bool, typer.Option("--left-right", help="Drop disparities that the right view's map contradicts.")
     ] = False,
@@ -130,6 +137,7 @@ def match(
         density=share("density", density),
         max_error=share("max-error", max_error),
         calibrated=calibrated,
+        within=within,
         left_right=left_right,
         subpixel=subpixel,
         fill=fill,

@@ -26,8 +26,8 @@ class CalibrationParams(Params):
         description="number of parts of the training scenes; networks of the other parts score each",
     )
     tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as correct, px")
-    sparse_tolerance: float = Field(
-        1.25, gt=0, description="the same in a scene with a sparse truth, which a laser measured less exactly, px"
+    laser_error: float = Field(
+        0.25, ge=0, description="what is allowed beside it where the truth is sparse: a laser measured it, px"
     )
     fold_of_scene: tuple[int, ...] | None = Field(
         None, description="part of each training scene; default: in turn, scenes like Cloth1 and Cloth2 together"

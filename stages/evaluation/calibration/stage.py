@@ -38,7 +38,7 @@ def compute_calibration(params: CalibrationParams, inputs: ScoredMaps) -> Calibr
     scenes = zip(scores_of, inputs["disparity"], inputs["truth"], strict=True)
     counts, tolerances = [], []
     for confidence, disparity, truth in scenes:
-        tolerances.append(params.tolerance if is_dense(truth["disparity"]) else params.sparse_tolerance)
+        tolerances.append(params.tolerance + (0 if is_dense(truth["disparity"]) else params.laser_error))
         counts.append(tally(confidence["confidence"], disparity["disparity"], truth["disparity"], tolerances[-1]))
     table = Table(np.stack([right for right, _ in counts]), np.stack([wrong for _, wrong in counts]))
     folds = np.array(params.fold_of_scene or (), np.intp)

@@ -75,8 +75,8 @@ class EvidenceSamplesParams(Params):
     """What counts as right in a training scene."""
 
     tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
-    sparse_tolerance: float = Field(
-        1.25, gt=0, description="the same in a scene with a sparse truth, which a laser measured less exactly, px"
+    laser_error: float = Field(
+        0.25, ge=0, description="what is allowed beside it where the truth is sparse: a laser measured it, px"
     )
     precision: Precision = Field("auto", description="arithmetic of the evaluation-Net: float32 or bfloat16")
 

@@ -30,7 +30,7 @@ def compute_evidence_samples(params: EvidenceSamplesParams, inputs: EvidentScene
     """
     disparity, truth = inputs["disparity"]["disparity"], inputs["truth"]["disparity"]
     known = of_whole_map(inputs["images"], inputs["disparity"], inputs["evaluation_net"], params.precision, REACH)
-    tolerance = params.tolerance if is_dense(truth) else params.sparse_tolerance
+    tolerance = params.tolerance + (0 if is_dense(truth) else params.laser_error)
     right = np.where(np.isnan(disparity), np.int8(UNKNOWN), label_pixels(disparity, truth, tolerance))
     if (right == UNKNOWN).all():
         raise StageError("a training scene has no pixel with a disparity and a known truth")

@@ -76,7 +76,7 @@ def test_the_file_holds_the_table_and_how_it_was_made(calibrated: Result, tmp_pa
     assert configuration["calibration"]["folds"] == 2
 
 
-def table_file(folder: Path, wrong: int) -> None:
+def table_file(folder: Path, wrong: int, name: str = "calibration", tolerance: float = 1.0) -> None:
     """Ship a table in which pixels of a confidence above 0.5 are wrong once in ten, above 0.8 ``wrong`` in 100."""
     p = probability((EDGES[1:] + EDGES[:-1]) / 2)
     bad = np.where(p < 0.5, 50, np.where(p < 0.8, 10, wrong)).astype(np.int64)
@@ -86,9 +86,9 @@ def table_file(folder: Path, wrong: int) -> None:
         "wrong": counts,
         "score": np.array([0.2, 0.1, 0.3]),
         "log_odds": 0.5 * EDGES,
-        "tolerance": np.ones(3),
+        "tolerance": np.full(3, tolerance),
     }
-    (folder / "calibration.safetensors").write_bytes(save_table(arrays, {}))
+    (folder / f"{name}.safetensors").write_bytes(save_table(arrays, {}))
     shipped.weights_digest.cache_clear()
 
 
@@ -125,6 +125,15 @@ def test_calibrated_and_plain_keep_the_same_pixels_for_a_wanted_error(table: Pat
     assert np.array_equal(plain.disparity, calibrated.disparity, equal_nan=True)
     assert not np.array_equal(plain.confidence, calibrated.confidence)
     assert calibrated.made("calibrated_confidence").step.scene == calibrated.scene.name
+
+
+def test_a_wanted_error_may_be_of_larger_errors(table: Path, tmp_path: Path) -> None:
+    table_file(table, 0, "calibration.3px", 3.0)
+    task = Task(TEST_ONLY, cache=tmp_path / "cache")
+    usual, wider = (match_all(task, Wishes(max_error=0.7, within=px))[0] for px in (None, 3))
+    assert usual.basis and wider.basis
+    assert (usual.basis.tolerances, wider.basis.tolerances) == ((1.0,), (3.0,))
+    assert "wrong by more than 3 px" in wider.basis.words
 
 
 def test_the_basis_is_in_the_summary(table: Path, tmp_path: Path) -> None:
@@ -166,6 +175,7 @@ def test_without_a_table_it_says_what_to_do(
     [
         pytest.param({"R": 0.5, "max_error": 0.1}, "R and max_error both say", id="R and an error"),
         pytest.param({"density": 0.5, "max_error": 0.1}, "density and max_error both say", id="density and an error"),
+        pytest.param({"within": 3.0}, "give max-error or calibrated too", id="a tolerance of nothing"),
         pytest.param({"max_error": 0.0}, "semidense.max_error", id="no error at all"),
         pytest.param({"max_error": 1.0}, "semidense.max_error", id="any error"),
     ],

@@ -1,6 +1,7 @@
 import hashlib
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from semidense.pipeline import api
 from semidense.pipeline.api import Task
 from semidense.pipeline.plan import shipped_weights as shipped
+from semidense.pipeline.plan.config import Config
 from semidense.pipeline.results.result import Result
 from semidense.stages.stage import StageError
 from tests.tiny import NETS, TEST_ONLY
@@ -24,6 +26,23 @@ def test_missing_weights_say_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_pat
 def test_a_calibration_is_of_one_confidence_alone() -> None:
     with pytest.raises(StageError, match=r"evidence_confidence and fast comes .* give R or a density instead"):
         shipped.shipped_weights("calibration", "fast", "evidence_confidence")
+
+
+@pytest.mark.parametrize(
+    ("settings", "known"),
+    [
+        pytest.param({"preset": "robust", "sets": ["calibration.tolerance=0.5"]}, "1 or 2 or 3", id="robust"),
+        pytest.param({"preset": "paper", "sets": ["calibration.tolerance=3"]}, "1", id="paper"),
+    ],
+)
+def test_an_error_without_a_calibration_names_those_with_one(settings: dict[str, Any], known: str) -> None:
+    with pytest.raises(StageError, match=rf"set calibration.tolerance \(--within\) to {known}, or give a calibration"):
+        shipped.weights_of(Config.load(None, settings["sets"], settings["preset"]), "calibration")
+
+
+def test_maps_without_any_calibration_are_told_so_for_every_error() -> None:
+    with pytest.raises(StageError, match=r"evidence_confidence and fast comes .* give R or a density instead"):
+        shipped.shipped_weights("calibration", "fast", "evidence_confidence", tolerance=2)
 
 
 def test_weights_are_found_in_the_package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

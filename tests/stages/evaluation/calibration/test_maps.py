@@ -61,11 +61,20 @@ def test_isotonic_pools_what_does_not_rise_by_hand() -> None:
 
 def test_the_brier_score_by_hand_is_lowest_for_the_truth() -> None:
     right, wrong = np.zeros((2, 1, BINS), np.int64)
-    right[0, 0], wrong[0, 0] = 3, 1
+    right[0, 1], wrong[0, 1] = 3, 1
     truth = np.full(EDGES.size, np.log(3.0))
     assert brier_score(Table(right, wrong), truth) == pytest.approx(0.75 * 0.25**2 + 0.25 * 0.75**2)
     for other in (-0.1, 0.1):
         assert brier_score(Table(right, wrong), truth + other) > brier_score(Table(right, wrong), truth)
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_what_a_veto_silenced_is_no_evidence_of_a_low_confidence(name: str) -> None:
+    """A veto sets pixels to 0 where the views say nothing; most of them are right, and no map may rise for that."""
+    vetoed = Table(OVERSURE.right.copy(), OVERSURE.wrong.copy())
+    vetoed.right[:, 0] += 40_000
+    vetoed.wrong[:, 0] += 20_000
+    assert np.allclose(FITS[name](vetoed)[20:], FITS[name](OVERSURE)[20:], atol=0.05)
 
 
 def test_scores_are_of_scenes_that_a_map_was_not_fitted_to() -> None:
