@@ -44,7 +44,7 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 
         list(means),
         [row.get(figure, 0) for row in means.values()],
         color=QUIET,
-        label=over if len(scenes) > 1 else scenes[0],
+        label=f"{over} scenes" if len(scenes) > 1 else scenes[0],
     )
     for method in means if len(scenes) > 1 else ():
         values = [row[figure] for row in rows if row["method"] == method and figure in row]
@@ -53,9 +53,10 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 
     if optimal is not None:
         axes.axvline(optimal, color=RED, linestyle="--", label="area of a perfect order")
     axes.invert_yaxis()
-    shown = FIGURES[figure]
+    shown, judged = FIGURES[figure], rows[0]
     unit = "" if shown.unit == "1" else f" ({shown.unit})"
-    axes.set(xlabel=fill(shown.meaning + unit, int(_LETTERS * width)), xlim=(0, None))
+    told = f"{shown.meaning}{unit}; mask {judged['mask']}, wrong above {judged['threshold_px']:g} px"
+    axes.set(xlabel=fill(told, int(_LETTERS * width)), xlim=(0, None))
     axes.locator_params(axis="x", nbins=5)
     axes.grid(axis="x", alpha=0.3)
     handles, labels = axes.get_legend_handles_labels()

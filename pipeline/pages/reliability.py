@@ -71,7 +71,7 @@ def reliability_figure(found: Reliability, *, title: str, mask: str = "all", thr
     figure.set_size_inches(6.2, 6)
     upper, lower = figure.subplots(2, 1, height_ratios=(4, 1), sharex=True)
     _draw_shares(upper, found)
-    upper.set_ylabel(f"share of {mask} pixels\noff by at most {threshold:g} px (0 to 1)")
+    upper.set_ylabel(f"share of pixels (mask {mask})\noff by at most {threshold:g} px (0 to 1)")
     centres = (np.arange(_BINS) + 0.5) / _BINS
     lower.bar(centres, found.pixels / max(found.pixels.sum(), 1), 0.9 / _BINS, color=SKY)
     lower.set(xlabel="confidence (0 to 1)", ylabel="share of\npixels (0 to 1)", xlim=(0, 1))

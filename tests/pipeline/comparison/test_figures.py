@@ -43,6 +43,12 @@ def test_a_method_that_lacks_a_scene_has_dots_and_no_bar() -> None:
     assert list(axes.lines[2].get_xdata()) == pytest.approx([0.15, 0.15])
 
 
+def test_the_bars_name_their_mask_and_threshold() -> None:
+    rows = [row("auc", scene, "ours", auc=0.2) for scene in "ab"]
+    label = dots_figure(rows, "auc", title="Areas").axes[0].get_xlabel()
+    assert " ".join(label.split()).endswith("; mask nonocc, wrong above 1 px")
+
+
 def test_a_matcher_that_lacks_a_scene_is_no_point_beside_our_curve() -> None:
     ours = [row("curve", scene, "ours", R=R, invalid=10 * R, bad=1 - R) for scene in "ab" for R in (0.0, 0.5)]
     others = [row("density", scene, "all", invalid=5.0, bad=2.0) for scene in "ab"]

@@ -36,7 +36,7 @@ def test_the_diagram_says_what_it_shows() -> None:
     written = {text.get_text() for text in drawn.findobj(Text)}
     assert {
         "confidence (0 to 1)",
-        "share of all pixels\noff by at most 1 px (0 to 1)",
+        "share of pixels (mask all)\noff by at most 1 px (0 to 1)",
         "share of\npixels (0 to 1)",
     } <= written
     assert any("calibration error 0.200" in text for text in written)
