@@ -16,6 +16,9 @@ from semidense.pipeline.api import Task, run, sweep
 from semidense.pipeline.pages.report import report
 from tests.system.conftest import NARROW, SCREENS, WIDE, Seen
 
+MM = 96 / 25.4
+"""Pixels of a browser in a millimetre. An A4 page has 182 x 269 mm inside the report's margins."""
+
 
 @pytest.fixture(scope="module")
 def address(trained_task: Task, tmp_path_factory: pytest.TempPathFactory) -> str:
@@ -100,6 +103,21 @@ def test_a_scene_is_printed_on_three_pages_without_controls(look: Callable[..., 
         assert not page.locator(hidden).first.is_visible()
     assert page.locator(".gallery").first.is_visible()
     assert page.evaluate("getComputedStyle(document.querySelector('.scroll')).breakInside") == "avoid", "with caption"
+
+
+@pytest.mark.parametrize("ratio", ["3 / 1", "6 / 5", "2 / 3"], ids=["street", "box", "tall"])
+def test_a_scene_fits_below_the_headline_figures_on_paper(look: Callable[..., Seen], address: str, ratio: str) -> None:
+    page: Any = look(address, (round(182 * MM), round(269 * MM))).page
+    page.emulate_media(media="print")
+    page.evaluate(
+        f"for (const each of document.querySelectorAll('.frame')) each.style.setProperty('--ratio', '{ratio}')"
+    )
+    assert page.evaluate("document.querySelector('.scene').getBoundingClientRect().bottom") <= 269 * MM
+    shapes = page.evaluate(
+        "[...document.querySelectorAll('.frame')].map((each) => each.offsetWidth / each.offsetHeight)"
+    )
+    width, height = map(int, ratio.split(" / "))
+    assert shapes == pytest.approx([width / height] * len(shapes), rel=0.03), "no picture is cut"
 
 
 def test_results_come_before_what_made_them(look: Callable[..., Seen], address: str) -> None:

@@ -38,7 +38,7 @@ def gallery(name: str, maps: SceneMaps, filtering: SemidenseParams, rows: Sequen
     shown = f", every {maps.step}. row and column shown" if maps.step > 1 else ""
     mask = f"; mask nonocc: {maps.mask_kind}" if maps.mask_kind else ""
     about = tag("p", text(f"{width} x {height} px{shown}{mask}"), class_="quiet about")
-    ratio = f"aspect-ratio: {width} / {height}"
+    ratio = f"--ratio: {width} / {height}"
     figures = [_figure(picture, ratio) for picture in _pictures(maps, filtering, rows)]
     grid = tag("div", *figures, class_="gallery")
     return tag("section", tag("h3", text(name)), about, _zoom(name), grid, class_="scene", data_scene=name)
