@@ -16,7 +16,7 @@ from semidense.pipeline.plan.environment import missing_packages
 from semidense.pipeline.plan.errors import UsageError, nearest
 from semidense.pipeline.plan.plan import Plan
 from semidense.pipeline.plan.presets import DEFAULT
-from semidense.pipeline.plan.steps import Request
+from semidense.pipeline.plan.steps import Request, note_on
 from semidense.pipeline.plan.training_split import training_scenes
 from semidense.stages.catalog import STAGES
 
@@ -124,12 +124,13 @@ def _require_others(products: Sequence[str]) -> None:
 
 
 def _with_truth(dataset: Dataset) -> tuple[Dataset, list[str]]:
-    """Return the dataset without scenes of unknown truth, and a note for each of those."""
+    """Return the dataset without scenes of unknown truth, and a note on those."""
     known = tuple(scene for scene in dataset.scenes if scene.has_truth)
     if not known:
         raise UsageError(f"{dataset.spec}: no scene has a ground truth, so there is nothing to compare with")
-    notes = [f"{scene.name} has no ground truth: it is left out" for scene in dataset.scenes if not scene.has_truth]
-    return dataclasses.replace(dataset, scenes=known), notes
+    others = [scene.name for scene in dataset.scenes if not scene.has_truth]
+    left_out = note_on(others, "has no ground truth: it is left out", "have no ground truth: they are left out")
+    return dataclasses.replace(dataset, scenes=known), left_out
 
 
 def _available(

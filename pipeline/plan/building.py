@@ -27,6 +27,8 @@ from semidense.pipeline.plan.steps import (
     code_of,
     known_so_far,
     made_from,
+    named,
+    note_on,
     place,
     scope_of,
     without_truth,
@@ -47,8 +49,7 @@ def build(request: Request) -> Graph:
         UsageError: if there is nothing to do, or settings do not go together.
         StageError: if shipped weights are needed and there are none.
     """
-    doubts = (f"{scene.name}: {warning}" for scene in request.dataset.scenes for warning in scene.warnings)
-    graph = Graph(notes=[*request.notes, *doubts])
+    graph = Graph(notes=[*request.notes, *_doubts(request.dataset.scenes)])
     trained_on = [scene.image_identity() for scene in request.training if request.leave_out]
     for variant, config in request.configs.items():
         builder = _Builder(graph, config, request)
@@ -60,25 +61,47 @@ def build(request: Request) -> Graph:
     return graph
 
 
+def _doubts(scenes: Sequence[SceneSource]) -> Iterator[str]:
+    """Yield each warning once, after the names of its scenes."""
+    found: dict[str, list[str]] = {}
+    for scene in scenes:
+        for warning in scene.warnings:
+            found.setdefault(warning, []).append(scene.name)
+    yield from (f"{named(names)}: {warning}" for warning, names in found.items())
+
+
 def _targets(builder: "_Builder", trained_on: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Add what one configuration asks for, but for the pairs that are trained on; yield the ids of its last steps."""
-    upto, notes = builder.request.upto, builder.graph.notes
+    upto = builder.request.upto
     if upto in STAGES and STAGES[upto].scope == "split":
         yield builder.product(upto, None)
         return
     if builder.config.training.held_out:
         yield from builder.held_out(upto)
         return
+    trained, untold, unknown = list[str](), list[str](), list[str]()
     for scene in builder.request.dataset.scenes:
         if trained_on and scene.image_identity() in trained_on:
-            notes.append(f"{scene.name} is a training scene: it is left out, since nothing is tested on it")
+            trained.append(scene.name)
         elif not scene.has_truth and "truth" in made_from(upto):
-            notes.append(f"{scene.name} has no ground truth: no {upto} can be made for it")
-            yield builder.product(known_so_far(scene, without_truth(upto), notes), scene)
+            untold.append(scene.name)
+            yield builder.product(known_so_far(scene, without_truth(upto), unknown), scene)
         else:
             yield from (
-                builder.product(known_so_far(scene, each, notes), scene) for each in (upto, *builder.request.also)
+                builder.product(known_so_far(scene, each, unknown), scene) for each in (upto, *builder.request.also)
             )
+    builder.graph.notes += _notes(upto, trained, untold, unknown)
+
+
+def _notes(upto: str, trained: Sequence[str], untold: Sequence[str], unknown: Sequence[str]) -> Iterator[str]:
+    """Yield a note on the scenes that are trained on, on those without a truth, and on those of unknown range."""
+    is_, are = "is a training scene: it is", "are training scenes: they are"
+    left_out = "left out, since nothing is tested on"
+    yield from note_on(trained, f"{is_} {left_out} it", f"{are} {left_out} them")
+    lacks = f"no ground truth: no {upto} can be made for"
+    yield from note_on(untold, f"has {lacks} it", f"have {lacks} them")
+    open_ = "no known range of disparities: it is estimated first; a run shows what comes after `survey`"
+    yield from note_on(unknown, f"has {open_}", f"have {open_}")
 
 
 @dataclass

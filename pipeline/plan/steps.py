@@ -4,7 +4,7 @@ A step is a product of one scene (or of the training split) with its settings. S
 share the steps in which they agree, so a sweep computes nothing twice. Nothing here looks at a cache.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import prod
 from typing import Any
@@ -23,6 +23,8 @@ NETS = ("matching_net", "descriptor_net", "evaluation_net")
 """Products that are networks."""
 SPLIT = "training split"
 """Stands for a scene in steps that belong to all training scenes together."""
+_NAMED = 3
+"""Scenes that a note on many names; the others are counted."""
 Argument = Params | SceneSource | Weights
 """What the function of a step is given first: its settings, or what it reads."""
 
@@ -198,9 +200,32 @@ def without_truth(product: str) -> str:
     return ways[-1] if ways else READ[0]
 
 
-def known_so_far(scene: SceneSource, product: str, notes: list[str]) -> str:
-    """Return the product, or the one to stop at while the scene's range is open; add a note of that."""
+def known_so_far(scene: SceneSource, product: str, unknown: list[str]) -> str:
+    """Return the product, or the one to stop at while the scene's range is open; add its name to the unknown then."""
     if not (scene.open_ends and needs_range(product)):
         return product
-    notes.append(f"{scene.name}: the range of disparities is estimated first; a run shows what comes after `survey`")
+    unknown.append(scene.name)
     return "survey"
+
+
+def named(scenes: Sequence[str]) -> str:
+    """Return the names of scenes for a sentence; of many the first, and how many more there are.
+
+    >>> named(["a"]), named(["a", "b"]), named([*"abcdefg"])
+    ('a', 'a and b', 'a, b, c and 4 more')
+    """
+    if len(scenes) > _NAMED + 1:
+        return f"{', '.join(scenes[:_NAMED])} and {len(scenes) - _NAMED} more"
+    return " and ".join(filter(None, (", ".join(scenes[:-1]), scenes[-1])))
+
+
+def note_on(scenes: Sequence[str], one: str, several: str) -> list[str]:
+    """Return one note on scenes, however many they are; none on none.
+
+    Args:
+        scenes: their names; a repeated one counts once.
+        one: what is said of a single scene, after its name.
+        several: what is said of several, after their names.
+    """
+    names = list(dict.fromkeys(scenes))
+    return [f"{named(names)} {one if len(names) == 1 else several}"] if names else []

@@ -79,7 +79,7 @@ def test_the_preset_robust_stands_beside_the_default_one(found: Comparison, task
 
 def test_training_scenes_are_not_compared_on(found: Comparison) -> None:
     assert found.scenes == ["test-0"]
-    assert any("train-0 is a training scene" in note for note in found.notes)
+    assert any("train-0 and train-1 are training scenes" in note for note in found.notes)
 
 
 def test_figures_hold_together(found: Comparison) -> None:

@@ -58,7 +58,7 @@ def test_run_prints_metrics_and_what_was_reused(invoke: Invoke, there: list[str]
     assert ran.code == 0
     assert "raw bad %" in ran.out
     assert ran.out.splitlines()[-1] == "reused 27 products, made nothing"
-    assert "train-0 is a training scene" in ran.err
+    assert "train-0 and train-1 are training scenes" in ran.err
 
 
 def test_run_as_json_prints_one_object(invoke: Invoke, there: list[str], trained: Result) -> None:

@@ -60,7 +60,23 @@ def test_with_training_the_training_scenes_are_only_learnt_from() -> None:
     two = dict.fromkeys(scored, 2)
     assert counts(made) == Counter({**four, **one, **two})
     assert [made.steps[each].scene for each, _ in made.targets] == ["test-0", "test-1"]
-    assert [note.split(" ")[0] for note in made.notes] == ["train-0", "train-1"]
+    left_out = "are training scenes: they are left out, since nothing is tested on them"
+    assert made.notes == [f"train-0 and train-1 {left_out}"]
+
+
+def test_a_hundred_training_scenes_are_told_in_one_short_line() -> None:
+    first = training_scenes(DATASET)[0]
+    many = Dataset("many", tuple(replace(first, name=f"train-{n}") for n in range(116)))
+    with pytest.raises(UsageError) as caught:
+        build(Request(many, {"": Config.load()}, "metrics", True, many.scenes))
+    assert "train-0, train-1, train-2 and 113 more are training scenes" in str(caught.value)
+    assert len(str(caught.value)) < 200
+
+
+def test_a_warning_of_several_scenes_is_told_once() -> None:
+    doubtful = tuple(replace(scene, warnings=("its file is old",)) for scene in DATASET.scenes)
+    made = graph(dataset=Dataset("doubtful", doubtful))
+    assert made.notes == ["train-0, train-1, test-0 and test-1: its file is old"]
 
 
 def test_training_scenes_are_known_by_their_content_not_their_name() -> None:
@@ -68,12 +84,12 @@ def test_training_scenes_are_known_by_their_content_not_their_name() -> None:
     request = Request(Dataset("renamed", renamed), {"": Config.load()}, "metrics", True, training_scenes(DATASET))
     made = build(request)
     assert [made.steps[each].scene for each, _ in made.targets] == ["other/test-0", "other/test-1"]
-    assert [note.split(" ")[0] for note in made.notes] == ["other/train-0", "other/train-1"]
+    assert [note.split(" are ")[0] for note in made.notes] == ["other/train-0 and other/train-1"]
 
 
 def test_where_all_scenes_are_trained_on_nothing_is_left() -> None:
     only = Dataset("synthetic", training_scenes(DATASET))
-    with pytest.raises(UsageError, match="no scene is left to work on; train-0 is a training scene") as caught:
+    with pytest.raises(UsageError, match="no scene is left to work on; train-0 and train-1 are training") as caught:
         build(Request(only, {"": Config.load()}, "metrics", True, only.scenes))
     assert "\n" not in str(caught.value)
 

@@ -87,7 +87,7 @@ def test_trained_networks_have_their_curves(page: str) -> None:
 
 def test_training_scenes_are_not_reported_on(page: str) -> None:
     assert re.findall(r'data-scene="([^"]*)"', page) == ["test-0"]
-    assert "train-0 is a training scene" in page
+    assert "train-0 and train-1 are training scenes" in page
 
 
 def test_what_is_not_cached_is_left_out(trained_task: Task, own_cache: Path, tmp_path: Path) -> None:
