@@ -171,6 +171,20 @@ def test_a_click_shows_the_costs_of_the_pixel(seen: Seen, small: Running) -> Non
     assert seen.said == []
 
 
+@pytest.mark.parametrize("name", ["cost-chart", "curve"])
+def test_axis_labels_fit_their_chart(seen: Seen, name: str) -> None:
+    click(seen, "raw", 31, 52)
+    seen.page.wait_for_function(f"{model('pixel')}.text.includes('y = ')")
+    seen.page.wait_for_timeout(500)
+    code = f"""(() => {{
+        const axis = {model(name)}.left[0], pen = document.createElement('canvas').getContext('2d')
+        pen.font = `${{axis.axis_label_text_font_size}} ${{axis.axis_label_text_font}}`
+        return [pen.measureText(axis.axis_label).width, Bokeh.index.find_one({model(name)}).frame.bbox.height]
+    }})()"""
+    needed, height = seen.page.evaluate(code)
+    assert 0 < needed <= height
+
+
 def test_a_pixel_can_be_named_by_its_place(seen: Seen, small: Running) -> None:
     seen.page.evaluate(f"{model('y')}.value = 10; {model('x')}.value = 77")
     seen.page.wait_for_function(f"{model('pixel')}.text.includes('y = 10, x = 77')")

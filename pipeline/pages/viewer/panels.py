@@ -48,6 +48,10 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 caption { text-align: left; color: var(--quiet); }
 th, td { padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line); }
 .number { text-align: right; white-space: nowrap; } .scroll { overflow-x: auto; }
+.scroll { --edge: linear-gradient(var(--quiet), var(--quiet)) no-repeat scroll;
+  --cover: linear-gradient(var(--paper), var(--paper)) no-repeat local;
+  background: var(--cover) left / 2rem 100%, var(--cover) right / 2rem 100%,
+    var(--edge) left / 2px 100%, var(--edge) right / 2px 100%; } /* a line where more is hidden */
 pre { overflow-x: auto; background: var(--soft); padding: .6rem; }
 summary { cursor: pointer; color: var(--accent); }
 """
@@ -236,7 +240,7 @@ def curve_chart(table: ColumnDataSource, second: ColumnDataSource, point: Column
 
 def cost_chart(curve: ColumnDataSource, marks: ColumnDataSource) -> tuple[Any, Span]:
     """Return the chart of a pixel's costs, and the line at its true disparity."""
-    plot = chart("costs", "disparity (px)", "cost: log-odds of a mismatch", 210)
+    plot = chart("cost-chart", "disparity (px)", "cost (log-odds)", 210)
     plot.line("d", "cost", source=curve, color=BLUE, line_width=2)
     plot.scatter("d", "cost", source=curve, color=BLUE, size=5)
     plot.scatter("d", "cost", source=marks, marker="marker", color="colour", line_color="black", size=16)
@@ -251,6 +255,7 @@ COST_LEGEND = (
     f'<span class="key"><b style="color:{RED}">★</b> winner</span>'
     f'<span class="key"><b style="color:{ORANGE}">▼</b> runner-up, the next local minimum</span>'
     f'<span class="key"><b style="color:{GREEN}">┆</b> truth</span>'
+    '<span class="key">cost: log-odds of a mismatch</span>'
 )
 MARKS = {"winner": ("star", RED), "runner-up": ("inverted_triangle", ORANGE)}
 """Marker and colour of the minima of a cost curve."""
