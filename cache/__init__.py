@@ -14,6 +14,7 @@ array([0, 1, 4])
 
 from semidense.cache.entries.backend import Checkpoint, Claim, Draft, Lease
 from semidense.cache.entries.entry import Entry
+from semidense.cache.entries.result import Result, Values, encode
 from semidense.cache.errors import (
     CacheError,
     CacheUnavailable,
@@ -52,11 +53,14 @@ __all__ = [
     "Lease",
     "NonDeterministicStage",
     "Recipe",
+    "Result",
     "SourceNotFound",
     "Store",
+    "Values",
     "code_hash_of",
     "code_parts",
     "differences",
+    "encode",
     "module_hash",
     "require_imported_as_hashed",
 ]

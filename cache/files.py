@@ -148,6 +148,16 @@ def add_folder(path: Path) -> None:
         path.mkdir(exist_ok=True)
 
 
+def make_new_folders(paths: Iterable[str]) -> None:
+    """Make folders, outer ones first; their names need not be on disk yet.
+
+    Raises:
+        OSError: if one is there, or its parent is not.
+    """
+    for path in paths:
+        os.mkdir(path)
+
+
 def sync(path: str | Path) -> None:
     """Have the file, or the names in the folder, on disk before this returns."""
     handle = os.open(path, os.O_RDONLY)
@@ -157,11 +167,17 @@ def sync(path: str | Path) -> None:
         os.close(handle)
 
 
-def write_new(path: Path, data: bytes) -> None:
+def write_new(path: str | Path, data: bytes) -> None:
     """Write a new read-only file; it need not be on disk yet."""
-    with path.open("xb") as file:
-        file.write(data)
-    make_read_only(path)
+    with open(path, "xb", buffering=0, opener=_open_read_only) as file:
+        left = memoryview(data)
+        while left:
+            left = left[file.write(left) :]
+
+
+def _open_read_only(path: str, flags: int) -> int:
+    """Open a new file that nobody but its writer can write to."""
+    return os.open(path, flags, 0o444)
 
 
 def write_whole(path: str | Path, data: bytes) -> None:

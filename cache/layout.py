@@ -110,8 +110,8 @@ class Layout:
         """Return the lease whose holder a draft belongs to."""
         return self.leases / draft.name.partition("-")[0]
 
-    def trash(self, lease: str) -> Path:
-        """Return a path among the drafts of a lease that nobody else has: to delete what is moved there."""
+    def new_draft(self, lease: str) -> Path:
+        """Return a path among the drafts of a lease that nobody else has, such as for what is deleted."""
         return self.drafts / f"{lease}-{secrets.token_hex(32)}"
 
     def new_quarantine(self, key: str) -> Path:

@@ -1,7 +1,7 @@
 """The cache as its users see it: find, require, open, begin."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +11,7 @@ from semidense.cache.document import plain_mapping
 from semidense.cache.entries.backend import Backend, Checkpoint, Claim, Draft, Lease, Policy
 from semidense.cache.entries.entry import Entry
 from semidense.cache.entries.folder import FolderBackend
+from semidense.cache.entries.result import Result
 from semidense.cache.errors import CacheUnavailable, DamagedEntry, EntryNotFound
 from semidense.cache.files import in_threads
 from semidense.cache.keys.recipe import Recipe, require_texts
@@ -217,6 +218,23 @@ class Store:
         """
         require_texts("label", label)
         return self.backend.begin(recipe, plain_mapping("label", label), lease, maker)
+
+    def publish_all(self, results: Sequence[Result], lease: Lease) -> list[Entry]:
+        """Publish small results of one writer together, and return their entries in order.
+
+        Each exists from a step of its own on, as if it came from a draft. But all are written and synced at one time:
+        for a disk, and for a far place, that takes little longer than one of them. Killed before the end, this leaves
+        some of them, each whole.
+
+        Args:
+            results: of different keys, from ``encode``.
+            lease: of the run that made them; it has their keys.
+
+        Raises:
+            NonDeterministicStage: if another writer published other content under one of the keys.
+            CacheUnavailable: if the cache refuses.
+        """
+        return self.backend.publish_all(results, lease)
 
     def entries(self) -> Iterator[Entry]:
         """Yield every entry with a well-formed record, in the order of keys.

@@ -21,6 +21,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
 from semidense.cache.entries.entry import Entry
+from semidense.cache.entries.result import Result
 from semidense.cache.keys.recipe import Recipe
 
 if TYPE_CHECKING:
@@ -261,6 +262,9 @@ class Backend(Protocol):
 
     def begin(self, recipe: Recipe, label: Mapping[str, str], lease: Lease | None, maker: str) -> Draft:
         """Return a draft, see ``Store.begin``."""
+
+    def publish_all(self, results: Sequence[Result], lease: Lease) -> list[Entry]:
+        """Publish results of one writer, see ``Store.publish_all``."""
 
     def claim(self, key: str) -> Claim | None:
         """Return the claim of making ``key``; None while another process or thread has it."""

@@ -5,7 +5,6 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -109,10 +108,8 @@ class FolderDraft(Draft):
                 publish.remove_strays(self.path, paths)
                 publish.STEP_HOOK("complete")
                 manifest = publish.seal(self.path, paths)
-                now = datetime.now(UTC).isoformat(timespec="microseconds")
-                label, key = self.label, self.recipe.key
-                entry = Entry(key, self.recipe, manifest.digest, label, now, float(seconds), manifest.size, extras)
-                return publish.commit(Layout(self.root), self.path, entry)
+                entry = Entry.now(self.recipe, self.label, manifest, seconds, extras)
+                return publish.commit(Layout(self.root), {self.path: entry})[0]
         finally:
             self.discard()
 

@@ -6,6 +6,7 @@ Both are read strictly: what does not have exactly the written form is damaged.
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from itertools import pairwise
 from typing import Any, Self
 
@@ -152,6 +153,14 @@ class Entry:
             raise InvalidRecipe("created, seconds and size must be a text, a float and an int")
         if self.key != self.recipe.key:
             raise InvalidRecipe(f"the recipe's key is {self.recipe.key}, not {self.key}")
+
+    @classmethod
+    def now(
+        cls, recipe: Recipe, label: Mapping[str, str], manifest: "Manifest", seconds: float, extras: Mapping[str, Any]
+    ) -> Self:
+        """Return the entry of a manifest's files, published now."""
+        created = datetime.now(UTC).isoformat(timespec="microseconds")
+        return cls(recipe.key, recipe, manifest.digest, label, created, float(seconds), manifest.size, extras)
 
     def provenance(self) -> dict[str, Any]:
         """Return where the entry comes from, as plain JSON types, for the attributes of its dataset."""

@@ -1,6 +1,6 @@
 """A cache in a folder, shared by processes and machines that see it."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from time import time
@@ -12,6 +12,7 @@ from semidense.cache.entries.check import inspect, inspect_data, read_record
 from semidense.cache.entries.draft import FolderDraft, hold
 from semidense.cache.entries.entry import DATA, Entry
 from semidense.cache.entries.quarantine import set_aside_if_damaged
+from semidense.cache.entries.result import Result
 from semidense.cache.errors import CacheUnavailable
 from semidense.cache.files import StateFile, add_folder, remove, writing
 from semidense.cache.keys.recipe import Recipe
@@ -96,6 +97,22 @@ class FolderBackend:
             add_folder(path)
         publish.STEP_HOOK("begun")
         return draft
+
+    def publish_all(self, results: Sequence[Result], lease: Lease) -> list[Entry]:
+        """Write results as drafts that nobody else writes to, and commit them together; see ``Backend``."""
+        self.layout.create()
+        own = None if lease.name else take_lease(self.layout)  # the run has none if it could not write when it began
+        name = own.path.name if own else str(lease.name)
+        drafts = {self.layout.new_draft(name): result for result in results}
+        try:
+            with writing(self.layout.drafts):
+                entries = {draft: publish.write_result(draft, result) for draft, result in drafts.items()}
+                return publish.commit(self.layout, entries)
+        finally:
+            for draft in drafts:
+                publish.discard(draft)
+            if own:
+                own.release()
 
     def claim(self, key: str) -> Lock | None:
         """Return the lock of making a key, see ``Backend``."""

@@ -8,6 +8,8 @@
 6. all files, the record and all folders are synced at one time: a disk needs little longer for many than for one;
 7. the record is linked to its name: now the entry exists.
 
+Several small results of one writer go through steps 4 to 7 together, so that they are synced at one time.
+
 A kill at any point leaves a whole entry or nothing that anybody sees, and another process of the same
 run can go on from there: ``resume`` finds the data that were renamed by the record beside the draft.
 A second writer of the same
@@ -18,18 +20,20 @@ and a record never fits another content.
 
 import os
 import secrets
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from semidense.cache.entries.check import MANIFESTS, RECORDS, inspect, inspect_data, read_plain
 from semidense.cache.entries.entry import MANIFEST, Entry, File, Manifest, folders_of
 from semidense.cache.entries.quarantine import move_anything, set_aside
+from semidense.cache.entries.result import Result
 from semidense.cache.errors import DamagedEntry, EntryNotFound, NonDeterministicStage
 from semidense.cache.files import (
     add_folder,
     hash_file,
     in_threads,
+    make_new_folders,
     make_read_only,
     move_folder,
     remove,
@@ -80,6 +84,12 @@ def seal(draft: Path, paths: Iterable[str]) -> Manifest:
     hashes = shared_out(hash_file, files, sum(sizes))
     manifest = Manifest(tuple(map(File, names, sizes, hashes)))
     STEP_HOOK("hashed")
+    _close(draft, manifest)
+    return manifest
+
+
+def _close(draft: Path, manifest: Manifest) -> None:
+    """Write the manifest of a draft's files, and make its folders read-only."""
     data = manifest.to_bytes()
     write_new(draft / MANIFEST, data)
     MANIFESTS.keep(manifest, data)
@@ -87,28 +97,49 @@ def seal(draft: Path, paths: Iterable[str]) -> Manifest:
     for folder in manifest.folders:  # not the draft itself: it is still to be renamed, which changes its ".."
         make_read_only(f"{draft}/{folder}")
     STEP_HOOK("sealed")
-    return manifest
 
 
-def commit(layout: Layout, draft: Path, entry: Entry) -> Entry:
-    """Give a sealed draft its place and write its record; the draft is gone afterwards.
+def write_result(draft: Path, result: Result) -> Entry:
+    """Write a result as a sealed draft, and return its entry.
+
+    Each folder is made inside one that must be there: a draft that is deleted meanwhile does not come back.
+    """
+    make_new_folders([str(draft), *(f"{draft}/{folder}" for folder in sorted(result.manifest.folders))])
+    STEP_HOOK("begun")
+    for path, data in result.files.items():
+        write_new(f"{draft}/{path}", data)
+    STEP_HOOK("chunk written")
+    _close(draft, result.manifest)
+    return result.entry()
+
+
+def commit(layout: Layout, drafts: Mapping[Path, Entry]) -> list[Entry]:
+    """Give sealed drafts their places and write their records; the drafts are gone afterwards.
 
     Returns:
-        The entry, or the one that another writer published first, if it is the same.
+        The entries in order, or those that another writer published first, if they are the same.
 
     Raises:
-        NonDeterministicStage: if another writer published other content under this key.
+        NonDeterministicStage: if another writer published other content under a key; no draft is placed then.
         CacheUnavailable, OSError: if the file system refuses.
     """
-    with held(layout.lock("commit", entry.key)):
+    with ExitStack() as locks:
+        for key in sorted(entry.key for entry in drafts.values()):  # in one order: nobody waits for each other
+            locks.enter_context(held(layout.lock("commit", key)))
         STEP_HOOK("locked")
-        published = _published(layout, draft, entry)
-        if published is None:
+        theirs = {
+            draft: found for draft, entry in drafts.items() if (found := _published(layout, draft, entry)) is not None
+        }
+        mine = {draft: entry for draft, entry in drafts.items() if draft not in theirs}
+        for draft, entry in mine.items():
             _write_record(draft, entry)
+        for draft, entry in mine.items():
             _place(layout, draft, entry)
-            published = _link_record(layout, draft, entry)
+        _settle(layout, {draft: entry.key for draft, entry in mine.items()})
+        linked = {draft: _link_record(layout, draft, entry) for draft, entry in mine.items()}
+        in_threads(sync, {str(layout.record(entry.key).parent) for entry in mine.values()})
     STEP_HOOK("published")
-    return published
+    return [{**theirs, **linked}[draft] for draft in drafts]
 
 
 def resume(layout: Layout, draft: Path, key: str) -> Entry | None:
@@ -127,8 +158,10 @@ def resume(layout: Layout, draft: Path, key: str) -> Entry | None:
         with suppress(FileNotFoundError, DamagedEntry):
             entry = Entry.from_bytes(key, read_plain(_record_beside(draft)))
             inspect_data(layout, entry, "full", remember=False)
-            _settle(layout, draft, key)
-            return _link_record(layout, draft, entry)
+            _settle(layout, {draft: key})
+            found = _link_record(layout, draft, entry)
+            sync(layout.record(key).parent)
+            return found
     return None
 
 
@@ -178,17 +211,24 @@ def _place(layout: Layout, draft: Path, entry: Entry) -> None:
     STEP_HOOK("cleared")
     move_folder(draft, target)
     STEP_HOOK("renamed")
-    _settle(layout, draft, entry.key)
+
+
+def _settle(layout: Layout, keys: Mapping[Path, str]) -> None:
+    """Have the files of entries, the records beside their drafts, and all names on the way to them on disk.
+
+    Args:
+        layout: of the cache.
+        keys: of the entries, each with the draft that it was.
+    """
+    waiting: dict[str, None] = {}
+    for draft, key in keys.items():
+        folder, shelf = layout.entry(key), layout.record(key).parent
+        make_read_only(folder)
+        add_folder(shelf)
+        waiting.update((f"{folder}/{path}", None) for path, _ in walk(folder))
+        waiting.update((str(path), None) for path in (folder, *folder.parents[:2], shelf.parent, _record_beside(draft)))
+    in_threads(sync, waiting)
     STEP_HOOK("entry synced")
-
-
-def _settle(layout: Layout, draft: Path, key: str) -> None:
-    """Have an entry's files, the record beside its draft, and the names of all that is on the way to them on disk."""
-    folder, shelf = layout.entry(key), layout.record(key).parent
-    make_read_only(folder)
-    add_folder(shelf)
-    inside = [f"{folder}/{path}" for path, _ in walk(folder)]
-    in_threads(sync, [*inside, *map(str, (folder, *folder.parents[:2], shelf.parent, _record_beside(draft)))])
 
 
 def _record_beside(draft: Path) -> Path:
@@ -222,5 +262,4 @@ def _link_record(layout: Layout, draft: Path, entry: Entry) -> Entry:
     finally:
         remove(temporary)
     STEP_HOOK("record linked")
-    sync(record.parent)
     return entry

@@ -1,14 +1,16 @@
 """A cache below the URL of an object store."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from functools import partial
 from time import time
 from typing import Any
 
-from semidense.cache.entries.backend import Draft, Lease, Policy
+from semidense.cache.entries.backend import Lease, Policy
 from semidense.cache.entries.entry import Entry, File
+from semidense.cache.entries.publish import require_same
+from semidense.cache.entries.result import Result
 from semidense.cache.errors import CacheError, CacheUnavailable, DamagedEntry, EntryNotFound
 from semidense.cache.files import in_threads
 from semidense.cache.keys.recipe import Recipe
@@ -123,7 +125,7 @@ class ObjectBackend:
             self.set_aside(record.entry.key, "full")
             raise
 
-    def begin(self, recipe: Recipe, label: Mapping[str, str], lease: Lease | None, maker: str) -> Draft:
+    def begin(self, recipe: Recipe, label: Mapping[str, str], lease: Lease | None, maker: str) -> ObjectDraft:
         """Return a draft below a prefix of its own, see ``Backend``."""
         self.create()
         name = (lease and lease.name) or names.new_lease()
@@ -133,6 +135,22 @@ class ObjectBackend:
         draft = ObjectDraft(recipe, label, time(), self.url, place)
         draft.begin()
         return draft
+
+    def publish_all(self, results: Sequence[Result], lease: Lease) -> list[Entry]:
+        """Write results and their records, several at a time; see ``Backend``."""
+
+        def publish(result: Result) -> Entry:
+            draft = self.begin(result.recipe, result.label, lease, result.maker)
+            try:
+                draft.fill(result.files)
+            except BaseException:
+                draft.discard()
+                raise
+            entry = draft.publish(result.seconds, result.extras)
+            require_same(entry, result.entry())  # the files may be those of another task of this run, which came first
+            return entry
+
+        return in_threads(publish, results)
 
     def claim(self, key: str) -> Living | None:
         """Return the claim of making a key, see ``Backend``."""

@@ -4,7 +4,6 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from functools import lru_cache
 from itertools import count
 from typing import TYPE_CHECKING, Any
@@ -100,6 +99,11 @@ class ObjectDraft(Draft):
         chunks = chunks_of(f"array {name!r} of {self.recipe.stage}", self._metadata_of(name), region, data)
         in_threads(lambda chunk: self._put(f"{DATA}/{name}/{chunk[0]}", encoded(chunk[1])), chunks)
 
+    def fill(self, files: Mapping[str, bytes]) -> None:
+        """Write all files of a result at one go."""
+        self._announce(*sorted({path.split("/")[1] for path in files} - {"zarr.json"}))
+        in_threads(lambda file: self._put(*file), files.items())
+
     def has_array(self, name: str) -> bool:
         """Return whether ``create_array`` made an array of this name."""
         return bool(NAME.fullmatch(name)) and self._about(name) is not None
@@ -125,9 +129,7 @@ class ObjectDraft(Draft):
         try:
             self._require_exists()
             manifest = self._manifest()
-            now = datetime.now(UTC).isoformat(timespec="microseconds")
-            key, label = self.recipe.key, self.label
-            entry = Entry(key, self.recipe, manifest.digest, label, now, float(seconds), manifest.size, extras)
+            entry = Entry.now(self.recipe, self.label, manifest, seconds, extras)
             self._decide(manifest.to_bytes())
             record = records.publish(self._objects, records.Record(entry, self.place))
         except BaseException:
@@ -176,10 +178,11 @@ class ObjectDraft(Draft):
             f"the draft of {self.recipe.stage} is gone: {self.place} in {self.url} was published or deleted"
         )
 
-    def _announce(self, name: str) -> None:
-        """Add an array to those that the mark names: whoever publishes must know them all, and a list may come late."""
+    def _announce(self, *names: str) -> None:
+        """Add arrays to those that the mark names: whoever publishes must know them all, and a list may come late."""
         while mark := self._objects.get(self._mark):
-            if name in _arrays_of(mark) or self._objects.replace(self._mark, mark.data + f"\n{name}".encode(), mark):
+            new = "".join(f"\n{name}" for name in names if name not in _arrays_of(mark))
+            if not new or self._objects.replace(self._mark, mark.data + new.encode(), mark):
                 return
         raise self._gone()
 

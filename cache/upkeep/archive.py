@@ -200,7 +200,7 @@ def _take_over(store: Store, archive: tarfile.TarFile, entry: Entry, manifest: M
             sealed = publish.seal(draft.path, [file.path for file in manifest.files])
             if sealed != manifest:
                 raise _Refused(f"the files of {entry.key} are not those of its manifest")
-            published = publish.commit(layout, draft.path, entry)
+            (published,) = publish.commit(layout, {draft.path: entry})
     except NonDeterministicStage:
         return Imported(entry, "differs: yours is kept")
     finally:

@@ -119,7 +119,7 @@ def collect(store: Store, items: Iterable[Item]) -> tuple[Item, ...]:
 
 def _delete(layout: Layout, lease: FolderLease, items: Iterable[Item]) -> list[Item]:
     """Move things out of sight and delete them; return those that nobody uses and that were still there."""
-    trash = layout.trash(lease.name or "0" * 32)
+    trash = layout.new_draft(lease.name or "0" * 32)
     try:
         with writing(layout.root):
             make_folder(trash)

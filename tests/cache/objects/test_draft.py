@@ -6,7 +6,16 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from semidense.cache import IncompleteDraft, InvalidArray, Recipe, Store
+from semidense.cache import (
+    IncompleteDraft,
+    InvalidArray,
+    NonDeterministicStage,
+    Recipe,
+    Result,
+    Store,
+    Values,
+    encode,
+)
 from semidense.cache.objects.requests import Listed, Objects, connect
 from tests.s3 import Faults, pointed_at, proxy
 
@@ -84,3 +93,32 @@ def test_an_object_that_somebody_else_wrote_is_no_chunk(memory: Store, recipe: R
 
 def _below(store: Store, prefix: str) -> list[Listed]:
     return list(connect(str(store.root)).below(prefix))
+
+
+def test_results_are_published_together_with_the_digests_of_a_folder(
+    objects_store: Store, store: Store, values: np.ndarray
+) -> None:
+    def result(number: int) -> Result:
+        recipe = Recipe("square", {"squares": "1f"}, {"n": number}, {"images": "ab"}, {})
+        arrays = {"map": Values(values, (2, 3), ("y", "x"), {}), "x": Values(np.arange(3), (3,), ("x",), {})}
+        return encode(recipe, {"scene": "Teddy"}, arrays, 1.5, {}, "step")
+
+    results, digests = [result(number) for number in range(4)], list[list[str]]()
+    for place in (objects_store, store):
+        with place.lease() as lease:
+            place.publish_all(results[:2], lease)
+            digests.append([entry.digest for entry in place.publish_all(results, lease)])
+    assert digests[0] == digests[1] == [each.digest for each in results]
+    assert connect(str(objects_store.root)).names("drafts") == []
+    np.testing.assert_array_equal(objects_store.read(results[3].recipe.key)["map"], values)
+
+
+def test_a_result_that_differs_from_what_is_there_is_refused(memory: Store, recipe: Recipe, values: np.ndarray) -> None:
+    with memory.lease() as lease:
+        first, other = (
+            encode(recipe, {}, {"map": Values(each, (3, 3), ("y", "x"), {})}, 1.5, {}) for each in (values, values + 1)
+        )
+        memory.publish_all([first], lease)
+        with pytest.raises(NonDeterministicStage, match=first.digest):
+            memory.publish_all([other], lease)
+    assert connect(str(memory.root)).names("drafts") == []
