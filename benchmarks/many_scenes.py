@@ -82,7 +82,7 @@ def timed_anew(side: Side) -> float:
 
 def beside_stages(task: Task) -> float:
     """Return the processor time of a run on one thread that the functions of the stages do not take."""
-    stages, call = [], tasks._call
+    stages, call = [], tasks.call
 
     def timed_call(*given: Any) -> Any:  # noqa: ANN401
         started = time.process_time()
@@ -92,7 +92,7 @@ def beside_stages(task: Task) -> float:
             stages.append(time.process_time() - started)
 
     started = time.process_time()
-    with patch.object(tasks, "_call", timed_call):
+    with patch.object(tasks, "call", timed_call):
         run(task, workers=1)
     return time.process_time() - started - sum(stages)
 

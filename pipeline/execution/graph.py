@@ -7,6 +7,7 @@ from typing import Any
 from uuid import uuid4
 
 from semidense.pipeline.execution import tasks
+from semidense.pipeline.execution.batch import make_all
 from semidense.pipeline.execution.jobs import Context
 from semidense.pipeline.execution.tiles import cut_rows
 from semidense.pipeline.plan.plan import Made, Plan, Planned
@@ -55,19 +56,23 @@ def batches(todo: Iterable[Planned]) -> list[list[Step]]:
     So no batch waits for itself.
     """
     steps = [planned.step for planned in todo]
-    many = len({step.scene for step in steps if _is_small(step)}) >= MANY
-    rounds: dict[str, int] = {}
-    found: dict[tuple[int, str, str], list[Step]] = {}
+    small = {step.id: _is_small(step) for step in steps}
+    if len({step.scene for step in steps if small[step.id]}) < MANY:
+        return [[step] for step in steps]
+    turns: dict[str, int] = {}  # small products have even ones, others odd ones
+    found: dict[tuple[int, str], list[Step]] = {}
     for step in steps:
-        own = "" if many and _is_small(step) else step.id
-        turn = max((rounds.get(each, 0) for ids in step.inputs.values() for each in ids), default=0)
-        rounds[step.id] = turn + bool(own)
-        found.setdefault((turn, own, step.scene), []).append(step)
-    return [found[place] for place in sorted(found, key=lambda place: (place[0], bool(place[1])))]
+        own = small[step.id]
+        before = [each for ids in step.inputs.values() for each in ids if each in turns]
+        turns[step.id] = turn = max([0 if own else -1, *(turns[each] + (small[each] != own) for each in before)])
+        found.setdefault((turn, step.scene if own else step.id), []).append(step)
+    return [found[place] for place in sorted(found, key=lambda place: place[0])]
 
 
 def _is_small(step: Step) -> bool:
-    return step.size is not None and (step.declared_bytes or _PIXEL * prod(step.size)) <= SMALL
+    if step.size is None or step.stage.monitored:
+        return False
+    return (step.declared_bytes or _PIXEL * prod(step.size)) <= SMALL
 
 
 def _add_value(graph: dict[str, Any], name: str, value: Any) -> Any:  # noqa: ANN401
@@ -101,7 +106,7 @@ def _inputs(steps: Sequence[Step], results: Mapping[str, Any]) -> Any:  # noqa: 
 def _add_batch(graph: dict[str, Any], steps: list[Step], plan: Plan, shared: Any, results: Mapping[str, Any]) -> Any:  # noqa: ANN401
     """Add the task of several steps of a scene, and return what refers to its list of ``Made``."""
     own, inputs = _add_value(graph, "steps", steps), _inputs(steps, results)
-    return _add_task(graph, "small scenes", tasks.make_all, shared, own, inputs, plan.forced)
+    return _add_task(graph, "small scenes", make_all, shared, own, inputs, plan.forced)
 
 
 def _add_step(graph: dict[str, Any], step: Step, plan: Plan, shared: Any, results: Mapping[str, Any]) -> Any:  # noqa: ANN401

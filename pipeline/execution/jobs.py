@@ -19,7 +19,7 @@ from semidense.pipeline.plan.errors import StageFailed, StageRefused, told_of_st
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.steps import Step
 from semidense.stages.compute.allocator import keep_freed_memory
-from semidense.stages.stage import Array, Output
+from semidense.stages.stage import Array
 
 Span = tuple[float, float]
 """When work began and ended, in seconds since the epoch."""
@@ -155,19 +155,12 @@ class Job:
         inputs: keys of the entries it is made from, by product.
         draft: where it is written; None if an equal result was there already.
         made: the result that was there already, else None.
-        arrays: takes what is made where the same task goes on with it; None where another may, for no array travels.
     """
 
     step: Step
     inputs: Mapping[str, tuple[str, ...]]
     draft: Draft | None
     made: Made | None
-    arrays: dict[str, Labelled] | None = None
-
-    def hand_on(self, output: Output, array: Array) -> None:
-        """Take a copy of a whole array that was written, laid out as it is when it is read."""
-        if self.arrays is not None:
-            self.arrays[output.name] = Labelled(np.array(array, order="C"), output.dims)
 
 
 def flat(results: Iterable[Made | Sequence[Made]]) -> list[Made]:
@@ -175,15 +168,19 @@ def flat(results: Iterable[Made | Sequence[Made]]) -> list[Made]:
     return [made for each in results for made in ([each] if isinstance(each, Made) else each)]
 
 
-@contextmanager
-def explained(step: Step, where: str = "") -> Iterator[None]:
+def explained(step: Step, where: str = "") -> AbstractContextManager[None]:
     """Name product, scene and tile in whatever goes wrong."""
+    return explained_at(f"{step.name}, {where}" if where else step.name)
+
+
+@contextmanager
+def explained_at(place: str) -> Iterator[None]:
+    """Name a place in whatever goes wrong there."""
     try:
         yield
     except (StageFailed, StageRefused):
         raise
     except Exception as error:
-        place = f"{step.name}, {where}" if where else step.name
         if line := told_of_stage(error):
             raise StageRefused(f"{place}: {line}") from error
         raise StageFailed(f"{place}: {error}" if str(error) else f"{place}: {type(error).__name__}") from error

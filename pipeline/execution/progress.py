@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from semidense.cache import Draft, Store
+from semidense.cache import Store
 from semidense.pipeline.plan.plan import Made, Plan
 from semidense.pipeline.plan.steps import Step
 
@@ -80,7 +80,7 @@ class ProgressWatch:
         """Print a line about the cluster: its workers, and where its dashboard is."""
         self._console.print(told, highlight=False, soft_wrap=True, markup=False)
 
-    def begun(self, step: Step, draft: Draft, tiles: int) -> None:
+    def begun(self, step: Step, tiles: int) -> None:
         """Name the product beside the bar."""
         with self._lock:
             self._compiling = self._compiling or self._listen()

@@ -6,9 +6,8 @@ another worker too: it finds the draft that was begun, the tile that was written
 """
 
 import time
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from typing import Any
 
 from semidense.cache import (
@@ -21,9 +20,8 @@ from semidense.cache import (
     require_imported_as_hashed,
 )
 from semidense.pipeline.execution.checkpoints import Checkpoints
-from semidense.pipeline.execution.claims import RunStopped
 from semidense.pipeline.execution.jobs import Context, Job, Span, Unread, explained, flat
-from semidense.pipeline.execution.tiles import Rows, cut_rows, read_block, trim
+from semidense.pipeline.execution.tiles import Labelled, Rows, read_block, trim
 from semidense.pipeline.plan.environment import cpu_name, version
 from semidense.pipeline.plan.errors import StageFailed
 from semidense.pipeline.plan.plan import Made
@@ -33,83 +31,58 @@ from semidense.stages.stage import Array, Arrays, Output
 VERSIONS = ("semidense-stereo", "dask", "numpy", "torch", "xarray", "zarr")
 
 
-def make_all(
-    context: Context, steps: Sequence[Step], inputs: Sequence[Made | Sequence[Made]], forced: Container[str]
-) -> list[Made]:
-    """Make small products of a scene one after the other, each published by itself; return them in order.
-
-    Run again after its worker died, this finds what it published, and goes on with what it began.
-
-    Raises:
-        RunStopped: if the run ended meanwhile.
-    """
-    by_id = {made.step.id: made for made in flat(inputs)}
-    for step in steps:
-        if not context.claims.lease.is_seen():
-            raise RunStopped("the run ended before this was begun")
-        needed = [by_id[each] for ids in step.inputs.values() for each in ids]
-        by_id[step.id] = _make(context, step, needed, step.product in forced)
-    return [by_id[step.id] for step in steps]
-
-
-def _make(context: Context, step: Step, inputs: Sequence[Made], forced: bool) -> Made:
-    job = begin(context, step, inputs, forced, step.tiles)
-    if step.tiles == 1 and context.runner is None:  # on a cluster another worker may have written a part of the draft
-        job = replace(job, arrays={})
-    if step.stage.tile_rows is None or step.size is None:
-        spans = [make_whole(context, job)]
-    else:
-        job = create_arrays(job)
-        spans = [make_tile(context, job, rows) for rows in cut_rows(step.size[0], step.stage.tile_rows)]
-    made = publish(context, job, spans)
-    if job.arrays:
-        context.recent.keep(made.key, job.arrays)
-    return made
-
-
 def begin(context: Context, step: Step, inputs: Sequence[Made | Sequence[Made]], forced: bool, tiles: int) -> Job:
     """Return the job of a step whose inputs are there; of a step whose result is there, a finished job."""
-    by_id = {made.step.id: made for made in flat(inputs)}
-    recipe = step.recipe({step_id: made.digest for step_id, made in by_id.items()})
-    keys = {product: tuple(by_id[each].key for each in ids) for product, ids in step.inputs.items()}
+    recipe, keys = ingredients(step, flat(inputs))
     with explained(step):
         context.admit(step)
-        if not forced and (made := _find(context, step, recipe)[0]):
-            context.claims.lease.add([recipe.key])
+        if made := there_or_claimed(context, step, recipe, forced):
             return Job(step, keys, None, made)
-        context.claims.take(recipe.key, lambda holder: context.watch.waiting(step, holder))
         try:
-            return _begin_claimed(context, step, recipe, keys, forced, tiles)
+            with context.claims.opening():
+                draft = context.store.begin(recipe, step.label, context.claims.lease, step.id)
+                context.watch.begun(step, tiles)
         except BaseException:
             context.claims.release(recipe.key)
             raise
-
-
-def _begin_claimed(
-    context: Context, step: Step, recipe: Recipe, keys: Mapping[str, tuple[str, ...]], forced: bool, tiles: int
-) -> Job:
-    """Look again, now that nobody else makes the product, and begin a draft."""
-    made, damage = _find(context, step, recipe)
-    if made and not forced:
-        context.claims.release(recipe.key)
-        return Job(step, keys, None, made)
-    if damage:  # the new one is not to be taken for a second writer's
-        with suppress(DamagedEntry, EntryNotFound):
-            context.store.require(recipe.key)
-    with context.claims.opening():
-        draft = context.store.begin(recipe, step.label, context.claims.lease, step.id)
-        context.watch.begun(step, draft, tiles)
     return Job(step, keys, draft, None)
 
 
-def _find(context: Context, step: Step, recipe: Recipe) -> tuple[Made | None, str | None]:
-    """Return a step's result if it is there and sound, and what is wrong with it; this very run may have made it."""
+def ingredients(step: Step, inputs: Iterable[Made]) -> tuple[Recipe, dict[str, tuple[str, ...]]]:
+    """Return the recipe of a step whose inputs are there, and by product the keys of those."""
+    by_id = {made.step.id: made for made in inputs}
+    recipe = step.recipe({step_id: made.digest for step_id, made in by_id.items()})
+    return recipe, {product: tuple(by_id[each].key for each in ids) for product, ids in step.inputs.items()}
+
+
+def there_or_claimed(context: Context, step: Step, recipe: Recipe, forced: bool) -> Made | None:
+    """Return a step's result if it is there, made by somebody else perhaps who was waited for; else claim its key."""
+    if not forced and (made := find(context, step, recipe)):
+        context.claims.lease.add([recipe.key])
+        return made
+    context.claims.take(recipe.key, lambda holder: context.watch.waiting(step, holder))
+    try:
+        made = find(context, step, recipe)
+    except BaseException:
+        context.claims.release(recipe.key)
+        raise
+    if made is None or forced:
+        return None
+    context.claims.release(recipe.key)
+    return made
+
+
+def find(context: Context, step: Step, recipe: Recipe) -> Made | None:
+    """Return a step's result if it is there and sound; this very run may have made it. A damaged one is set aside."""
     run = context.claims.lease.name
     entry, damage = context.store.look(recipe.key)
+    if damage:  # a new one is not to be taken for a second writer's
+        with suppress(DamagedEntry, EntryNotFound):
+            context.store.require(recipe.key)
     if entry is None or damage:
-        return None, damage
+        return None
     reused = run is None or entry.extras.get("run") != run
-    return Made(step, entry.key, entry.digest, entry.seconds, reused), None
+    return Made(step, entry.key, entry.digest, entry.seconds, reused)
 
 
 def make_tile(context: Context, job: Job, rows: Rows) -> Span | None:
@@ -121,28 +94,24 @@ def make_tile(context: Context, job: Job, rows: Rows) -> Span | None:
         context.admit(step)
         if job.draft.published() or _holds_tile(job.draft, step.stage.outputs, rows):
             return None
-        made = _compute_tile(context, job, rows)
+        opened = {product: context.recent.open(context.store, keys[0]) for product, keys in job.inputs.items()}
+        made = compute_tile(step, opened, rows)
         for output in step.stage.outputs:
-            _write_tile(job, job.draft, output, made[output.name], rows)
+            _write_tile(job.draft, output, made[output.name], rows)
     context.watch.advanced(step, 1, step.tiles, "")
     return begun, time.time()
 
 
-def _compute_tile(context: Context, job: Job, rows: Rows) -> Arrays:
-    """Return a tile's own rows of a product."""
-    step = job.step
-    inputs = {
-        product: read_block(context.recent.open(context.store, keys[0]), rows, step.stage, step.params)
-        for product, keys in job.inputs.items()
-    }
-    made = _call(step, inputs)
+def compute_tile(step: Step, inputs: Mapping[str, Mapping[str, Labelled]], rows: Rows) -> Arrays:
+    """Return a tile's own rows of a product, given all that it is made from."""
+    made = call(step, {name: read_block(arrays, rows, step.stage, step.params) for name, arrays in inputs.items()})
     if step.stage.border != "cut":
         return made
     dims = {output.name: output.dims for output in step.stage.outputs}
     return trim(made, dims, rows, step.stage.halo(step.params))
 
 
-def _call(step: Step, *arguments: object) -> Arrays:
+def call(step: Step, *arguments: object) -> Arrays:
     """Call a stage's function, and see that what it imported is what the step's key names."""
     function = step.stage.function()
     require_imported_as_hashed(step.code)
@@ -153,7 +122,7 @@ def _call(step: Step, *arguments: object) -> Arrays:
 
 def _holds_tile(draft: Draft, outputs: Iterable[Output], rows: Rows) -> bool:
     """Return whether another worker wrote this tile."""
-    return all(draft.holds(output.name, _region(output, rows)) for output in outputs if _has_part(output, rows))
+    return all(draft.holds(output.name, region(output, rows)) for output in outputs if has_part(output, rows))
 
 
 def create_arrays(job: Job) -> Job:
@@ -180,13 +149,12 @@ def make_whole(context: Context, job: Job) -> Span | None:
         context.admit(step)
         if job.draft.published() or all(job.draft.holds(output.name) for output in step.stage.outputs):
             return None
-        inputs = {product: _read_whole(context, step, product, keys) for product, keys in job.inputs.items()}
-        made = _call(step, inputs, *_monitor(context, job.draft, step))
+        inputs = {product: read_whole(context, step, product, keys) for product, keys in job.inputs.items()}
+        made = call(step, inputs, *_monitor(context, job.draft, step))
         for output in step.stage.outputs:
             array = made[output.name].astype(output.dtype or made[output.name].dtype, copy=False)
             _create(job.draft, output, array.shape, str(array.dtype), None)
             job.draft.write(output.name, tuple(slice(0, length) for length in array.shape), array)
-            job.hand_on(output, array)
     context.watch.advanced(step, 1, 1, "")
     return begun, time.time()
 
@@ -211,7 +179,7 @@ def publish(context: Context, job: Job, spans: Sequence[Span | None]) -> Made:
         with explained(job.step):
             try:
                 context.admit(job.step)
-                entry = _publish(job.draft, seconds, _extras(context, job.step))
+                entry = _publish(job.draft, seconds, extras(context, job.step))
                 if job.step.stage.monitored:
                     context.store.checkpoint(entry.key).remove()
             finally:
@@ -232,7 +200,7 @@ def _publish(draft: Draft, seconds: float, extras: Mapping[str, Any]) -> Entry:
         raise
 
 
-def _extras(context: Context, step: Step) -> dict[str, Any]:
+def extras(context: Context, step: Step) -> dict[str, Any]:
     """Return what is stored beside a result: what the run gives to all, and what belongs to this one."""
     own: dict[str, Any] = {"cpu": cpu_name(), "configuration": step.configuration}
     own |= {"image_size": list(step.size)} if step.size else {}
@@ -257,9 +225,7 @@ def provenance(command: Sequence[str]) -> dict[str, Any]:
     return {"versions": {name: version(name) for name in VERSIONS}, "command": list(command)}
 
 
-def _read_whole(
-    context: Context, step: Step, product: str, keys: Sequence[str]
-) -> Mapping[str, Any] | Sequence[Arrays]:
+def read_whole(context: Context, step: Step, product: str, keys: Sequence[str]) -> Mapping[str, Any] | Sequence[Arrays]:
     """Return a product's arrays, unread if the stage asks for it; where a split step takes one a scene, unread ones."""
     if step.takes_list(product):
         return [Unread(context.store, key) for key in keys]
@@ -268,28 +234,32 @@ def _read_whole(
 
 def _create(draft: Draft, output: Output, shape: Sequence[int], dtype: str, tile_rows: int | None) -> None:
     """Create one array, chunked so that a tile writes whole chunks, unless it is there."""
-    if draft.has_array(output.name):
-        return
+    if not draft.has_array(output.name):
+        draft.create_array(output.name, shape, dtype, *layout(output, shape, tile_rows))
+
+
+def layout(
+    output: Output, shape: Sequence[int], tile_rows: int | None
+) -> tuple[list[int], tuple[str, ...], dict[str, str]]:
+    """Return chunks, dims and attrs of an array."""
     chunks = [
         tile_rows if dim == "y" and tile_rows else output.chunks.get(dim, length)
         for dim, length in zip(output.dims, shape, strict=True)
     ]
-    attrs = {"units": output.units, "long_name": output.about}
-    draft.create_array(output.name, shape, dtype, [max(1, chunk) for chunk in chunks], output.dims, attrs)
+    return [max(1, chunk) for chunk in chunks], output.dims, {"units": output.units, "long_name": output.about}
 
 
-def _write_tile(job: Job, draft: Draft, output: Output, array: Array, rows: Rows) -> None:
+def _write_tile(draft: Draft, output: Output, array: Array, rows: Rows) -> None:
     """Write a tile's part of one array."""
-    if _has_part(output, rows):
-        part = array.astype(output.dtype, copy=False)
-        draft.write(output.name, _region(output, rows), part)
-        job.hand_on(output, part)
+    if has_part(output, rows):
+        draft.write(output.name, region(output, rows), array.astype(output.dtype, copy=False))
 
 
-def _has_part(output: Output, rows: Rows) -> bool:
+def has_part(output: Output, rows: Rows) -> bool:
     """Return whether a tile writes a part of an array: what has no rows is written by the first tile alone."""
     return "y" in output.dims or rows.start == 0
 
 
-def _region(output: Output, rows: Rows) -> tuple[slice, ...]:
+def region(output: Output, rows: Rows) -> tuple[slice, ...]:
+    """Return the part of an array that is a tile's."""
     return tuple(slice(rows.start, rows.stop) if dim == "y" else slice(None) for dim in output.dims)

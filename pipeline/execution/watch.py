@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from semidense.cache import Draft, Store
+from semidense.cache import Store
 from semidense.pipeline.plan.plan import Made, Plan
 from semidense.pipeline.plan.steps import Step
 
@@ -16,8 +16,8 @@ class Watch(Protocol):
     def deployed(self, told: str) -> None:
         """The workers of a cluster are there; ``told`` is one line about them."""
 
-    def begun(self, step: Step, draft: Draft, tiles: int) -> None:
-        """A product is being made in ``draft``, in so many tiles."""
+    def begun(self, step: Step, tiles: int) -> None:
+        """A product is being made, in so many tiles."""
 
     def waiting(self, step: Step, holder: str) -> None:
         """Another process is making the product: this run waits for it."""
@@ -38,7 +38,7 @@ class Unwatched:
     def deployed(self, told: str) -> None:
         """See nothing."""
 
-    def begun(self, step: Step, draft: Draft, tiles: int) -> None:
+    def begun(self, step: Step, tiles: int) -> None:
         """See nothing."""
 
     def waiting(self, step: Step, holder: str) -> None:

@@ -53,6 +53,7 @@ def run_on_cluster(
         except BaseException:
             _abandon(client, lease)
             raise
+        lease.discard_drafts()  # of workers that were killed
         if told := _time_line(client, began):
             watch.deployed(told)
         return made

@@ -5,22 +5,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from semidense.cache import Store
 from semidense.pipeline.execution import graph as graphs
-from semidense.pipeline.execution import tasks
-from semidense.pipeline.execution.claims import Claims, RunStopped
+from semidense.pipeline.execution.claims import Claims
 from semidense.pipeline.execution.graph import MANY, SMALL, batches, make_graph
-from semidense.pipeline.execution.jobs import Context, Job
+from semidense.pipeline.execution.jobs import Context
 from semidense.pipeline.execution.scheduler import execute
 from semidense.pipeline.execution.watch import Unwatched
-from semidense.pipeline.plan.errors import StageFailed
-from semidense.pipeline.plan.plan import Made, Plan, Planned
+from semidense.pipeline.plan.plan import Plan, Planned
 from semidense.pipeline.plan.steps import SPLIT, Graph, Step
 from semidense.stages.stage import Output
-from tests.pipeline.toy import BLURRED, CALLS, RAMP, SUM, Offset, graph, step
+from tests.pipeline.toy import BLURRED, RAMP, SUM, Offset, graph, step
 
 ToyPlan = Callable[..., Plan]
 COUNT = MANY + 2
@@ -68,101 +65,6 @@ def test_both_ways_give_the_same_results_in_the_order_of_the_plan(
     assert toy_plan(scenes()).todo() == ()
 
 
-def test_each_product_of_a_batch_is_told_and_published_by_itself(toy_plan: ToyPlan, store: Store) -> None:
-    told: list[tuple[str, str]] = []
-
-    class Seen(Unwatched):
-        def published(self, made: Made) -> None:
-            assert store.find(made.key)
-            told.append((made.step.scene, made.step.product))
-
-    execute(toy_plan(scenes()), store, Seen(), {}, workers=2)
-    assert sorted(told) == sorted((f"Toy {n}", product) for n in range(COUNT) for product in ("ramp", "blurred", "sum"))
-
-
-def test_a_scene_that_fails_is_named_and_what_was_made_is_kept(
-    toy_plan: ToyPlan, store: Store, drafts: Callable[[], list[str]]
-) -> None:
-    broken = replace(BLURRED, compute="tests.pipeline.toy:fail_below")
-    steps = [each for number in range(COUNT) for each in (scene(number, broken) if number == 5 else scene(number))]
-    with pytest.raises(StageFailed, match=r"^blurred of Toy 5, rows 0-3: the fourth row broke it$"):
-        execute(toy_plan(graph(*steps)), store, Unwatched(), {}, workers=1)
-    assert drafts() == []
-    kept = {(entry.label["scene"], entry.label["product"]) for entry in store.entries()}
-    assert ("Toy 5", "ramp") in kept
-    assert ("Toy 5", "blurred") not in kept
-    CALLS.clear()
-    execute(toy_plan(scenes()), store, Unwatched(), {}, workers=2)
-    assert len(CALLS) == 5 * COUNT - sum({"ramp": 1, "blurred": 3, "sum": 1}[product] for _, product in kept)
-
-
-def test_a_batch_whose_worker_died_goes_on_where_that_stopped(
-    context: Context, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    class Killed(BaseException):
-        pass
-
-    steps, publish = scene(1), tasks.publish
-
-    def die(context: Context, job: Job, spans: Any) -> Made:  # noqa: ANN401
-        if job.step.product == "blurred":
-            raise Killed
-        return publish(context, job, spans)
-
-    monkeypatch.setattr(tasks, "publish", die)
-    with pytest.raises(Killed):
-        tasks.make_all(context, steps, [], frozenset())
-    assert CALLS == ["ramp", "blurred", "blurred", "blurred"]
-    monkeypatch.undo()
-    made = tasks.make_all(context, steps, [], frozenset())
-    assert CALLS[4:] == ["sum"], "neither what was published nor tiles that were written are made again"
-    assert tuple(each.step for each in made) == steps
-    assert not any(each.reused for each in made)
-    assert list(context.store.layout.drafts.iterdir()) == []
-
-
-def test_a_batch_reads_nothing_again_that_it_just_made(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
-    opened, real = [], Store.arrays
-    monkeypatch.setattr(Store, "arrays", lambda self, key: opened.append(key) or real(self, key))
-    tasks.make_all(context, scene(1, replace(BLURRED, tile_rows=16)), [], frozenset())
-    assert opened == []
-    ramp, blurred, _ = tasks.make_all(context, scene(2), [], frozenset())
-    assert opened == [blurred.key], "of several tiles no one holds the whole"
-    assert context.recent.open(context.store, ramp.key)["values"].dims == ("y", "x")
-    for key in (ramp.key, blurred.key):
-        kept, read = context.recent.read(context.store, key), context.store.read(key)
-        assert {name: (each.tobytes(), each.strides) for name, each in kept.items()} == {
-            name: (each.tobytes(), each.strides) for name, each in read.items()
-        }
-
-
-def test_on_a_cluster_a_batch_reads_what_was_published(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A worker that was given up may have written into the same draft."""
-    monkeypatch.setattr(Context, "admit", lambda *_: None)
-    with store.lease() as lease:
-        context = Context(store, Unwatched(), {}, Claims(lease), runner={})
-        made = tasks.make_all(context, scene(1), [], frozenset())
-    assert list(context.recent._kept) == [made[0].key, made[1].key], "each of them by reading"
-
-
-def test_what_is_handed_on_is_a_copy_as_it_would_be_read() -> None:
-    job, array = Job(scene(1)[0], {}, None, None, arrays={}), np.arange(6.0).reshape(2, 3).T
-    job.hand_on(RAMP.outputs[0], array)
-    array[:] = 0
-    assert job.arrays is not None
-    values = job.arrays["values"].values
-    assert values[...].tolist() == [[0, 3], [1, 4], [2, 5]]
-    assert isinstance(values, np.ndarray) and values.flags.c_contiguous
-
-
-def test_a_batch_ends_with_its_run(store: Store) -> None:
-    with store.lease() as lease:
-        context = Context(store, Unwatched(), {}, Claims(lease))
-    with pytest.raises(RunStopped):
-        tasks.make_all(context, scene(1), [], frozenset())
-    assert CALLS == []
-
-
 def todo(*steps: Step) -> list[Planned]:
     return [Planned(each, "missing") for each in steps]
 
@@ -185,6 +87,22 @@ def test_a_batch_waits_for_nothing_that_is_made_from_it() -> None:
         own = {each.id for each in steps}
         assert {each for one in steps for ids in one.inputs.values() for each in ids} <= there | own
         there |= own
+
+
+def test_what_is_made_from_no_small_product_comes_first_and_keeps_no_scene_apart() -> None:
+    shipped = replace(step(RAMP, "net", scene=SPLIT), size=None)
+    last = [step(SUM, "last", scene=total.scene, blurred=total, net=shipped) for *_, total in map(scene, range(COUNT))]
+    steps = [each for number, after in enumerate(last) for each in (*scene(number), after)]
+    order = batches(todo(*steps[:3], shipped, *steps[3:]))
+    assert [len(each) for each in order] == [1] + [4] * COUNT
+
+
+def test_what_is_monitored_has_a_task_of_its_own() -> None:
+    """Its states are kept for whoever goes on with it."""
+    steps = [(*scene(number), step(replace(SUM, monitored=True), scene=f"Toy {number}")) for number in range(COUNT)]
+    assert [len(each) for each in batches(todo(*(each for four in steps for each in four)))] == [1] * COUNT + [
+        3
+    ] * COUNT
 
 
 def test_what_is_there_already_keeps_no_scene_apart() -> None:

@@ -12,7 +12,6 @@ from semidense.pipeline.execution.progress import ProgressWatch
 from semidense.pipeline.plan.plan import Made, Plan, Planned
 from tests.pipeline.toy import RAMP, SUM, step
 
-NO_DRAFT: Any = None
 NO_STORE: Any = None
 TILED, TRAINED = step(RAMP, 0), step(replace(SUM, monitored=True))
 
@@ -27,7 +26,7 @@ def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 def test_without_a_terminal_nothing_is_said_of_quick_work(capsys: pytest.CaptureFixture[str], now: list[float]) -> None:
     with ProgressWatch() as watch:
-        watch.begun(TILED, NO_DRAFT, 2)
+        watch.begun(TILED, 2)
         watch.advanced(TILED, 1, 2, "")
         watch.published(Made(TILED, "k", "d", 0.5, False))
     assert capsys.readouterr() == ("", "")
@@ -35,8 +34,8 @@ def test_without_a_terminal_nothing_is_said_of_quick_work(capsys: pytest.Capture
 
 def test_compiling_is_told_once(capsys: pytest.CaptureFixture[str], now: list[float]) -> None:
     with ProgressWatch() as watch:
-        watch.begun(TILED, NO_DRAFT, 2)
-        watch.begun(TRAINED, NO_DRAFT, 1)
+        watch.begun(TILED, 2)
+        watch.begun(TRAINED, 1)
         for factor in (2, 3):
             assert numba.njit(lambda x, factor=factor: factor * x)(5) == 5 * factor
     assert numba.njit(lambda x: 4 * x)(5) == 20, "after the end nothing is said"
@@ -47,7 +46,7 @@ def test_without_a_terminal_long_work_says_a_line_now_and_then(
     capsys: pytest.CaptureFixture[str], now: list[float]
 ) -> None:
     with ProgressWatch() as watch:
-        watch.begun(TRAINED, NO_DRAFT, 1)
+        watch.begun(TRAINED, 1)
         for done in range(1, 101):
             now[0] = done * 1.0
             watch.advanced(TRAINED, done, 100, f"loss {1 / done:.2f}")
@@ -65,7 +64,7 @@ def test_without_a_terminal_long_work_says_a_line_now_and_then(
 
 def test_steps_of_a_checkpoint_took_no_time(capsys: pytest.CaptureFixture[str], now: list[float]) -> None:
     with ProgressWatch() as watch:
-        watch.begun(TRAINED, NO_DRAFT, 1)
+        watch.begun(TRAINED, 1)
         for done in range(61, 101):
             now[0] = (done - 60) * 1.0
             watch.advanced(TRAINED, done, 100, "")
@@ -74,7 +73,7 @@ def test_steps_of_a_checkpoint_took_no_time(capsys: pytest.CaptureFixture[str], 
 
 def test_tiles_add_up(capsys: pytest.CaptureFixture[str], now: list[float]) -> None:
     with ProgressWatch() as watch:
-        watch.begun(TILED, NO_DRAFT, 4)
+        watch.begun(TILED, 4)
         watch.advanced(TILED, 1, 4, "")
         now[0] = 30.0
         watch.advanced(TILED, 1, 4, "")
@@ -108,9 +107,9 @@ def test_on_a_terminal_there_is_one_bar_for_the_whole_run(monkeypatch: pytest.Mo
     watch._console = watch._bar.live.console = Console(file=terminal, force_terminal=True, width=120)
     with watch:
         watch.planned(PLAN, NO_STORE)
-        watch.begun(TILED, NO_DRAFT, 2)
+        watch.begun(TILED, 2)
         watch.published(Made(TILED, "k", "d", 0.5, False))
-        watch.begun(TRAINED, NO_DRAFT, 1)
+        watch.begun(TRAINED, 1)
         watch.advanced(TRAINED, 3, 10, "loss 0.25")
         watch._bar.refresh()
         (whole,) = watch._bar.tasks
@@ -125,7 +124,7 @@ def test_on_a_terminal_there_is_one_bar_for_the_whole_run(monkeypatch: pytest.Mo
 def test_parts_of_a_product_move_the_bar() -> None:
     with ProgressWatch() as watch:
         watch.planned(PLAN, NO_STORE)
-        watch.begun(TILED, NO_DRAFT, 4)
+        watch.begun(TILED, 4)
         watch.advanced(TILED, 1, 4, "")
         assert watch._bar.tasks[0].completed == 0.25
 

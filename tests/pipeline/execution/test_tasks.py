@@ -6,7 +6,7 @@ import cloudpickle
 import numpy as np
 import pytest
 
-from semidense.cache import CacheUnavailable, Draft, Store
+from semidense.cache import CacheUnavailable, Store
 from semidense.cache.processes.lease import FolderLease
 from semidense.datasets import DatasetError
 from semidense.pipeline.execution import tasks
@@ -30,7 +30,7 @@ class Seen:
     def __init__(self) -> None:
         self.told: list[tuple[Any, ...]] = []
 
-    def begun(self, step: Step, draft: Draft, tiles: int) -> None:
+    def begun(self, step: Step, tiles: int) -> None:
         self.told.append(("begun", step.product, tiles))
 
     def advanced(self, step: Step, done: int, total: int, note: str) -> None:
