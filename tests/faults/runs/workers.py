@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +24,12 @@ from semidense.pipeline.execution.watch import Unwatched
 from semidense.pipeline.plan.errors import UsageError
 from tests.faults import world
 from tests.faults.runs import slow
+from tests.faults.runs.work import SCENES, Scenes, Work, of_scale
 from tests.faults.tally import Tally
 from tests.tiny import TEST_ONLY
 
 PROJECT = Path(__file__).parents[3]
 NAMES = PROJECT / "build" / "names"
-SCENES = 8
 EDITS = (
     ("stages/transforms/gray.py", "semidense.stages.transforms.gray"),
     ("pipeline/execution/tiles.py", "semidense.pipeline.execution.tiles"),
@@ -73,7 +74,11 @@ def _edited_installation(folder: Path, path: str) -> Iterator[Path]:
 
 def _worker(address: str, names: Path, log: Path) -> "subprocess.Popen[bytes]":
     command = ["-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(names), str(PROJECT)])}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join([str(names), str(PROJECT)]),
+        "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",  # it keeps workers busy that wait
+    }
     with log.open("ab") as file:
         return subprocess.Popen(
             [sys.executable, *command], env=environment, cwd=names, stdout=file, stderr=subprocess.STDOUT
@@ -127,70 +132,79 @@ def _nothing_left(tally: Tally, store: Store, where: str) -> None:
 
 
 def killed_workers(scale: float) -> Tally:
-    """Kill one of four workers at a random time of a run of eight scenes; then the scheduler, and all workers."""
+    """Kill workers of four at random times of a run of eight scenes; then the scheduler, and all workers.
+
+    Its digests are those of a run on threads.
+    """
     tally, chance = Tally(), random.Random(16)
-    with cluster(4) as address:
-        undisturbed, expected = _undisturbed(address)
-        slowest = 0.0
-        for number in range(max(2, int(60 * scale))):
-            where = f"kill {number}"
-            with world.folder() as root:
-                killer = Killer(address, chance.uniform(0, undisturbed), chance.randrange(4))
-                seconds = _run(tally, Store(root), address, expected, where)
-                killer.join()
-                slowest = max(slowest, seconds / undisturbed)
-            tally.injected += 1
-    tally.figures["slowest run in undisturbed ones"] = round(slowest, 1)
+    with of_scale(scale) as work, cluster(4) as address:
+        kills, at_once = (20, 4) if isinstance(work, Scenes) else (max(2, int(60 * scale)), 1)
+        _same_elsewhere(tally, work, address)
+        with world.folder() as root:
+            expected = work.run(Store(root))
+        undisturbed, slowest = [_run(tally, work, address, expected, "no kill") for _ in range(2)][1], 0.0
+        for number in range(0, kills, at_once):
+            killer = Killer(address, chance, undisturbed, at_once)
+            slowest = max(slowest, _run(tally, work, address, expected, f"from kill {number}") / undisturbed)
+            killer.join()
+        tally.injected += kills
+        tally.figures |= {"workers killed": kills, "slowest run in undisturbed ones": round(slowest, 1)}
+        tally.figures[work.name] = work.scenes
     _killed_schedulers(tally, max(1, int(3 * scale)))
     _no_workers(tally)
     return tally
 
 
-def _undisturbed(address: str) -> tuple[float, dict[str, str]]:
-    """Return how long a run takes, and its digests; the first one also loads the workers."""
-    expected: dict[str, str] = {}
-    for _ in range(2):
+def _same_elsewhere(tally: Tally, work: Work, address: str) -> None:
+    """Run real scenes with both presets on threads and in processes, with the preset ``paper`` on the cluster too."""
+    if not isinstance(work, Scenes):
+        return
+    for preset, places in (("robust", ("processes:2",)), ("paper", ("processes:2", address))):
         with world.folder() as root:
-            started = time.monotonic()
-            store, graph = Store(root), slow.scenes(SCENES)
-            made = attempt(lambda s=store, g=graph: world.plan(s, g), store, Unwatched(), {}, address)[1]  # type: ignore[misc]
-            expected = {each.key: each.digest for each in made.values()}
-    return time.monotonic() - started, expected
+            expected = replace(work, preset=preset).run(Store(root))
+        for place in places:
+            _run(tally, replace(work, preset=preset), place, expected, f"{preset} on {place}")
 
 
-def _run(tally: Tally, store: Store, address: str, expected: dict[str, str], where: str) -> float:
-    started, graph = time.monotonic(), slow.scenes(SCENES)
-    try:
-        made = attempt(lambda: world.plan(store, graph), store, Unwatched(), {}, address)[1]
-    except Exception as error:  # noqa: BLE001 - whatever it is, the run must not fail
-        tally.fail("lost", f"{where}: {error!r}")
-    else:
-        if {each.key: each.digest for each in made.values()} != expected:
-            tally.fail("wrong", f"{where}: other digests")
-    world.judge(tally, store, expected, where)
-    _nothing_left(tally, store, where)
-    return time.monotonic() - started
+def _run(tally: Tally, work: Work, address: str, expected: dict[str, str], where: str) -> float:
+    """Run in a new cache, and look at what is there; return the seconds that the run took."""
+    with world.folder() as root:
+        store, started = Store(root), time.monotonic()
+        try:
+            if work.run(store, address) != expected:
+                tally.fail("wrong", f"{where}: other digests")
+        except Exception as error:  # noqa: BLE001 - whatever it is, the run must not fail
+            tally.fail("lost", f"{where}: {error!r}")
+        seconds = time.monotonic() - started
+        world.judge(tally, store, expected, where)
+        _nothing_left(tally, store, where)
+    return seconds
 
 
 class Killer:
-    """Kills a worker after a while, and waits until the cluster is whole again."""
+    """Kills some of four workers, each at a random time of a run, and waits until the cluster is whole again.
 
-    def __init__(self, address: str, after: float, which: int) -> None:
+    Args:
+        address: of the scheduler.
+        chance: chooses.
+        seconds: that the run takes.
+        count: of the workers to kill.
+    """
+
+    def __init__(self, address: str, chance: random.Random, seconds: float, count: int) -> None:
         from distributed import Client
 
         self._client = Client(address, set_as_default=False)
         self._client.wait_for_workers(4, timeout=world.HANGS)
         pids: dict[str, int] = self._client.run(os.getpid)
-        self._pid = sorted(pids.values())[which]
-        self._timer = threading.Timer(after, self._kill)
-        self._timer.start()
-
-    def _kill(self) -> None:
-        with suppress(ProcessLookupError):
-            os.kill(self._pid, signal.SIGKILL)
+        self._pids = chance.sample(sorted(pids.values()), count)
+        self._timers = [threading.Timer(chance.uniform(0, seconds), _kill, [pid]) for pid in self._pids]
+        for timer in self._timers:
+            timer.start()
 
     def join(self) -> None:
-        self._timer.join()
+        for timer in self._timers:
+            timer.join()
         deadline = time.monotonic() + world.HANGS
         while not self._whole():
             if time.monotonic() > deadline:
@@ -199,11 +213,16 @@ class Killer:
         self._client.close()
 
     def _whole(self) -> bool:
-        """Say whether there are four workers again, without the killed one."""
-        with suppress(Exception):  # the one that was killed may be asked, too
+        """Say whether there are four workers again, without the killed ones."""
+        with suppress(Exception):  # one that was killed may be asked, too
             pids = self._client.run(os.getpid, on_error="ignore")
-            return len(pids) == 4 and self._pid not in pids.values()
+            return len(pids) == 4 and not {*self._pids} & {*pids.values()}
         return False
+
+
+def _kill(pid: int) -> None:
+    with suppress(ProcessLookupError):
+        os.kill(pid, signal.SIGKILL)
 
 
 def _killed_schedulers(tally: Tally, trials: int) -> None:
