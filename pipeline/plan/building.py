@@ -79,25 +79,34 @@ def _targets(builder: "_Builder", trained_on: Sequence[Mapping[str, Any]]) -> It
     if builder.config.training.held_out:
         yield from builder.held_out(upto)
         return
-    trained, untold, unknown = list[str](), list[str](), list[str]()
+    trained, learnt, untold, unknown = list[str](), list[str](), list[str](), list[str]()
+    judged = "truth" in made_from(upto)
     for scene in builder.request.dataset.scenes:
         if trained_on and scene.image_identity() in trained_on:
             trained.append(scene.name)
-        elif not scene.has_truth and "truth" in made_from(upto):
+        elif judged and not scene.has_truth:
             untold.append(scene.name)
             yield builder.product(known_so_far(scene, without_truth(upto), unknown), scene)
         else:
+            if judged and scene.split == "train" and not builder.request.training:
+                learnt.append(scene.name)
             yield from (
                 builder.product(known_so_far(scene, each, unknown), scene) for each in (upto, *builder.request.also)
             )
-    builder.graph.notes += _notes(upto, trained, untold, unknown)
+    builder.graph.notes += _notes(upto, trained, learnt, untold, unknown)
 
 
-def _notes(upto: str, trained: Sequence[str], untold: Sequence[str], unknown: Sequence[str]) -> Iterator[str]:
-    """Yield a note on the scenes that are trained on, on those without a truth, and on those of unknown range."""
-    is_, are = "is a training scene: it is", "are training scenes: they are"
+def _notes(
+    upto: str, trained: Sequence[str], learnt: Sequence[str], untold: Sequence[str], unknown: Sequence[str]
+) -> Iterator[str]:
+    """Yield a note on the scenes of each kind: trained on, perhaps known to the weights, without truth, or range."""
+    is_, are = "is a training scene:", "are training scenes:"
     left_out = "left out, since nothing is tested on"
-    yield from note_on(trained, f"{is_} {left_out} it", f"{are} {left_out} them")
+    yield from note_on(trained, f"{is_} it is {left_out} it", f"{are} they are {left_out} them")
+    known = "the package's weights may have learnt from"
+    yield from note_on(
+        learnt, f"{is_} {known} it, so its figures are no test", f"{are} {known} them, so their figures are no test"
+    )
     lacks = f"no ground truth: no {upto} can be made for"
     yield from note_on(untold, f"has {lacks} it", f"have {lacks} them")
     open_ = "no known range of disparities: it is estimated first; a run shows what comes after `survey`"

@@ -48,8 +48,13 @@ def counts(made: Graph) -> Counter[str]:
 def test_without_training_every_scene_is_worked_on_with_the_shipped_weights() -> None:
     made = graph()
     assert counts(made) == Counter(dict.fromkeys(PATH - TRAINING, 4)) - Counter(dict.fromkeys(SHIPPED, 3))
-    assert made.notes == []
     assert len(made.targets) == 4
+
+
+def test_figures_of_scenes_that_the_weights_may_know_are_told_to_be_no_test() -> None:
+    (note,) = graph().notes
+    assert note.startswith("train-0 and train-1 are training scenes: the package's weights may have learnt from them")
+    assert graph(upto="disparity").notes == [], "nothing is judged"
 
 
 def test_with_training_the_training_scenes_are_only_learnt_from() -> None:
@@ -75,7 +80,7 @@ def test_a_hundred_training_scenes_are_told_in_one_short_line() -> None:
 
 def test_a_warning_of_several_scenes_is_told_once() -> None:
     doubtful = tuple(replace(scene, warnings=("its file is old",)) for scene in DATASET.scenes)
-    made = graph(dataset=Dataset("doubtful", doubtful))
+    made = graph(upto="disparity", dataset=Dataset("doubtful", doubtful))
     assert made.notes == ["train-0, train-1, test-0 and test-1: its file is old"]
 
 
@@ -261,7 +266,7 @@ def test_a_scene_without_truth_gets_maps_and_no_metrics() -> None:
     made = graph(dataset=without_truth())
     last = {made.steps[each].scene: made.steps[each].product for each, _ in made.targets}
     assert last == {"train-0": "metrics", "train-1": "metrics", "test-0": "metrics", "test-1": "semidense"}
-    assert made.notes == ["test-1 has no ground truth: no metrics can be made for it"]
+    assert made.notes[1:] == ["test-1 has no ground truth: no metrics can be made for it"]
     assert not [step for step in made.steps.values() if step.product == "truth" and step.scene == "test-1"]
 
 
