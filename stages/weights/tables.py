@@ -14,7 +14,7 @@ from semidense.stages.stage import Array, Arrays, StageError
 
 LARGEST = 2**22
 """Bytes; a larger file is refused before it is parsed."""
-_LENGTHS = {"bin": BINS, "edge": BINS + 1, "map": len(MAPS), "all": 1}
+_LENGTHS = {"bin": BINS, "edge": BINS + 1, "map": len(MAPS)}
 
 
 def save_table(calibration: Arrays, metadata: Mapping[str, Any]) -> bytes:

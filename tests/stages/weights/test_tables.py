@@ -22,7 +22,7 @@ def table() -> Arrays:
         "wrong": counts[:, ::-1],
         "score": np.array([0.3, 0.1, 0.2]),
         "log_odds": EDGES * 0.9,
-        "tolerance": np.array([1.0]),
+        "tolerance": np.ones(2),
     }
 
 
@@ -59,7 +59,9 @@ def test_the_metadata_say_how_it_was_made(tmp_path: Path) -> None:
         pytest.param(lambda t: t.update(log_odds=EDGES[::-1].copy()), "must be finite and rise", id="a falling map"),
         pytest.param(lambda t: t.update(log_odds=EDGES * np.nan), "must be finite and rise", id="NaN"),
         pytest.param(
-            lambda t: t.update(right=t["right"][:0], wrong=t["wrong"][:0]), "a scene at least", id="no scene at all"
+            lambda t: t.update({name: t[name][:0] for name in ("right", "wrong", "tolerance")}),
+            "a scene at least",
+            id="no scene at all",
         ),
     ],
 )
