@@ -119,19 +119,23 @@ def test_shares_of_wrong_pixels_by_hand() -> None:
     maps = domains._Maps(
         truth=row, mask=np.array([[True, True, True, True, False]]), own=row + np.float32([[0, 1.5, 0, 9, 9]]),
         sgm=row + np.float32([[np.nan, 0, 5, np.nan, 0]]), sgm_dense=row + np.float32([[5, 0, 5, 0, 0]]),
-        score=score, chance=score,
+        score=score, chance={1.0: score},
     )  # fmt: skip
     shares = domains._shares(maps, score >= np.float32(0.9), domains.Ranking.of(score[maps.mask]), 1.0)
     assert [*shares.values()] == [50, 50, 50, 50, 50]
     shares = domains._shares(maps, score >= np.float32(0.9), domains.Ranking.of(score[maps.mask]), 2.0)
     assert [*shares.values()] == [25, 50, 0, 50, 0]
     # A mean doubt of (0 + 0.05 + 0.08) / 3 is within 5 %: three pixels are kept, two of them count.
-    assert domains._promised(maps, 0.05)["0.05 kept"] == 50
-    assert domains._promised(maps, 0.05)["0.05 wrong > 1 px"] == 50
+    assert domains._promised(maps, 0.05) == {"0.05 kept, within 1 px": 50, "0.05 wrong, > 1 px": 50}
     # 0.95 and 0.92 share a bin with one right pixel; 0.5 is right and 0.1 is wrong, each in a bin of its own.
-    right = np.array([True, False, True, False])
     expected = (abs(0.95 + 0.92 - 1) + 0.5 + 0.1) / 4
-    assert domains._calibration_error(score[maps.mask], right) == pytest.approx(expected, abs=1e-6)
+    assert domains._calibration_errors([maps, maps], 1.0) == pytest.approx(
+        {"ECE > 1 px": expected, "ECE a scene > 1 px": expected, "ECE with vetoed > 1 px": expected}, abs=1e-6
+    )
+    score[0, 3] = 0  # a veto: the pixel has no probability
+    errors = domains._calibration_errors([maps], 1.0)
+    assert errors["ECE > 1 px"] == pytest.approx((abs(0.95 + 0.92 - 1) + 0.5) / 3, abs=1e-6)
+    assert errors["ECE with vetoed > 1 px"] == pytest.approx((abs(0.95 + 0.92 - 1) + 0.5) / 4, abs=1e-6)
 
 
 def test_the_choice_of_the_agreement_is_a_table(

@@ -72,7 +72,7 @@ def test_the_readme_quotes_the_accuracy_of_each_preset() -> None:
 def test_the_faults_that_a_page_tells_are_those_that_were_injected() -> None:
     row = next(row for row in json.loads((ROOT / "docs/faults.json").read_text())["rows"] if row["row"] == 29)
     killed, spoilt = row["figures"]["workers killed"], row["figures"]["requests spoilt"]
-    assert f"In row 29, {killed} workers were killed and {spoilt} requests spoilt" in text("docs/clusters.md")
+    assert f"In row 29, {killed} workers were killed and {spoilt:,} requests spoilt" in text("docs/clusters.md")
 
 
 def test_the_version_is_the_same_everywhere() -> None:
