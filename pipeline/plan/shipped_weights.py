@@ -182,6 +182,10 @@ def read_table(weights: Weights, _: Inputs) -> dict[str, Array]:
     return tables.read_table(weights.read())
 
 
+def _listed(texts: list[str]) -> str:
+    return " or ".join(filter(None, (", ".join(texts[:-1]), texts[-1])))
+
+
 def _missing(name: str) -> str:
     """Return what is missing and what to do about it."""
     if found := re.fullmatch(r"(?P<others>.*?)\.(?P<px>\d[\d.e+-]*)px", name):
@@ -189,7 +193,7 @@ def _missing(name: str) -> str:
         if known:
             return (
                 f"no calibration for errors of up to {found['px']} px comes with this installation: set "
-                f"calibration.tolerance (--within) to {' or '.join(known)}, or give a calibration of your own "
+                f"calibration.tolerance (--within) to {_listed(known)}, or give a calibration of your own "
                 "(weights.calibration=FILE)"
             )
         name = found["others"]

@@ -31,7 +31,7 @@ def test_a_calibration_is_of_one_confidence_alone() -> None:
 @pytest.mark.parametrize(
     ("settings", "known"),
     [
-        pytest.param({"preset": "robust", "sets": ["calibration.tolerance=0.5"]}, "1 or 2 or 3", id="robust"),
+        pytest.param({"preset": "robust", "sets": ["calibration.tolerance=0.5"]}, "1, 2 or 3", id="robust"),
         pytest.param({"preset": "paper", "sets": ["calibration.tolerance=3"]}, "1", id="paper"),
     ],
 )
