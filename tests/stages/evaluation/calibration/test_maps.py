@@ -68,7 +68,7 @@ def test_the_brier_score_by_hand_is_lowest_for_the_truth() -> None:
         assert brier_score(Table(right, wrong), truth + other) > brier_score(Table(right, wrong), truth)
 
 
-@pytest.mark.parametrize("name", MAPS)
+@pytest.mark.parametrize("name", ["platt", "isotonic"])
 def test_what_a_veto_silenced_is_no_evidence_of_a_low_confidence(name: str) -> None:
     """A veto sets pixels to 0 where the views say nothing; most of them are right, and no map may rise for that."""
     vetoed = Table(OVERSURE.right.copy(), OVERSURE.wrong.copy())
