@@ -57,7 +57,7 @@ class Table:
     def shares(self) -> tuple[Floats, Floats]:
         """Right and wrong pixels by confidence, as shares of a scene's pixels, summed over the scenes: (bin,) each.
 
-        The first bin is empty: it holds what a veto set to 0. That is silence and no probability; most of it is right.
+        The first bin counts as empty. It holds what a veto set to 0, which is no probability: most of it is right.
         """
         pixels = np.maximum((self.right + self.wrong).sum(axis=1, keepdims=True), 1)
         right, wrong = ((counts / pixels).sum(axis=0) for counts in (self.right, self.wrong))
