@@ -176,7 +176,7 @@ def _draw(matchers: dict[str, dict[str, float]], title: str, path: Path) -> None
     for colour, marker, (name, found) in styles:
         style: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 10, "markeredgecolor": "black"}
         axes.plot(found["seconds"], found["raw_bad"], linestyle="none", label=name, **style)
-    axes.set(xscale="log", xlabel="time (s)", ylabel="wrong by more than 1 px (% of the pixels that both views see)")
+    axes.set(xscale="log", xlabel="time (s)", ylabel="wrong by more than 1 px\n(% of the nonocc pixels)")
     axes.set_ylim(0, 1.1 * max(found["raw_bad"] for found in matchers.values()))
     axes.grid(alpha=0.3)
     legend_below(figure, axes.get_legend_handles_labels()[0])
