@@ -13,8 +13,8 @@ array([0, 1, 4])
 """
 
 from semidense.cache.entries.backend import Checkpoint, Claim, Draft, Lease
+from semidense.cache.entries.encoded import Encoded, Values, encode
 from semidense.cache.entries.entry import Entry
-from semidense.cache.entries.result import Result, Values, encode
 from semidense.cache.errors import (
     CacheError,
     CacheUnavailable,
@@ -44,6 +44,7 @@ __all__ = [
     "DamagedEntry",
     "Draft",
     "EditedSource",
+    "Encoded",
     "Entry",
     "EntryNotFound",
     "IncompleteDraft",
@@ -53,7 +54,6 @@ __all__ = [
     "Lease",
     "NonDeterministicStage",
     "Recipe",
-    "Result",
     "SourceNotFound",
     "Store",
     "Values",

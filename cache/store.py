@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from semidense.cache.document import plain_mapping
 from semidense.cache.entries.backend import Backend, Checkpoint, Claim, Draft, Lease, Policy
+from semidense.cache.entries.encoded import Encoded
 from semidense.cache.entries.entry import Entry
 from semidense.cache.entries.folder import FolderBackend
-from semidense.cache.entries.result import Result
 from semidense.cache.errors import CacheUnavailable, DamagedEntry, EntryNotFound
 from semidense.cache.files import in_threads
 from semidense.cache.keys.recipe import Recipe, require_texts
@@ -219,7 +219,7 @@ class Store:
         require_texts("label", label)
         return self.backend.begin(recipe, plain_mapping("label", label), lease, maker)
 
-    def publish_all(self, results: Sequence[Result], lease: Lease) -> list[Entry]:
+    def publish_all(self, results: Sequence[Encoded], lease: Lease) -> list[Entry]:
         """Publish small results of one writer together, and return their entries in order.
 
         Each exists from a step of its own on, as if it came from a draft. But all are written and synced at one time:

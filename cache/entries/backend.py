@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
+from semidense.cache.entries.encoded import Encoded
 from semidense.cache.entries.entry import Entry
-from semidense.cache.entries.result import Result
 from semidense.cache.keys.recipe import Recipe
 
 if TYPE_CHECKING:
@@ -263,7 +263,7 @@ class Backend(Protocol):
     def begin(self, recipe: Recipe, label: Mapping[str, str], lease: Lease | None, maker: str) -> Draft:
         """Return a draft, see ``Store.begin``."""
 
-    def publish_all(self, results: Sequence[Result], lease: Lease) -> list[Entry]:
+    def publish_all(self, results: Sequence[Encoded], lease: Lease) -> list[Entry]:
         """Publish results of one writer, see ``Store.publish_all``."""
 
     def claim(self, key: str) -> Claim | None:

@@ -10,9 +10,9 @@ from semidense.cache.entries import publish
 from semidense.cache.entries.backend import Lease, Policy
 from semidense.cache.entries.check import inspect, inspect_data, read_record
 from semidense.cache.entries.draft import FolderDraft, hold
+from semidense.cache.entries.encoded import Encoded
 from semidense.cache.entries.entry import DATA, Entry
 from semidense.cache.entries.quarantine import set_aside_if_damaged
-from semidense.cache.entries.result import Result
 from semidense.cache.errors import CacheUnavailable
 from semidense.cache.files import StateFile, add_folder, remove, writing
 from semidense.cache.keys.recipe import Recipe
@@ -98,7 +98,7 @@ class FolderBackend:
         publish.STEP_HOOK("begun")
         return draft
 
-    def publish_all(self, results: Sequence[Result], lease: Lease) -> list[Entry]:
+    def publish_all(self, results: Sequence[Encoded], lease: Lease) -> list[Entry]:
         """Write results as drafts that nobody else writes to, and commit them together; see ``Backend``."""
         self.layout.create()
         own = None if lease.name else take_lease(self.layout)  # the run has none if it could not write when it began

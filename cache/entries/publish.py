@@ -25,9 +25,9 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from semidense.cache.entries.check import MANIFESTS, RECORDS, inspect, inspect_data, read_plain
+from semidense.cache.entries.encoded import Encoded
 from semidense.cache.entries.entry import MANIFEST, Entry, File, Manifest, folders_of
 from semidense.cache.entries.quarantine import move_anything, set_aside
-from semidense.cache.entries.result import Result
 from semidense.cache.errors import DamagedEntry, EntryNotFound, NonDeterministicStage
 from semidense.cache.files import (
     add_folder,
@@ -99,7 +99,7 @@ def _close(draft: Path, manifest: Manifest) -> None:
     STEP_HOOK("sealed")
 
 
-def write_result(draft: Path, result: Result) -> Entry:
+def write_result(draft: Path, result: Encoded) -> Entry:
     """Write a result as a sealed draft, and return its entry.
 
     Each folder is made inside one that must be there: a draft that is deleted meanwhile does not come back.

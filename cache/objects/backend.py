@@ -8,9 +8,9 @@ from time import time
 from typing import Any
 
 from semidense.cache.entries.backend import Lease, Policy
+from semidense.cache.entries.encoded import Encoded
 from semidense.cache.entries.entry import Entry, File
 from semidense.cache.entries.publish import require_same
-from semidense.cache.entries.result import Result
 from semidense.cache.errors import CacheError, CacheUnavailable, DamagedEntry, EntryNotFound
 from semidense.cache.files import in_threads
 from semidense.cache.keys.recipe import Recipe
@@ -136,10 +136,10 @@ class ObjectBackend:
         draft.begin()
         return draft
 
-    def publish_all(self, results: Sequence[Result], lease: Lease) -> list[Entry]:
+    def publish_all(self, results: Sequence[Encoded], lease: Lease) -> list[Entry]:
         """Write results and their records, several at a time; see ``Backend``."""
 
-        def publish(result: Result) -> Entry:
+        def publish(result: Encoded) -> Entry:
             draft = self.begin(result.recipe, result.label, lease, result.maker)
             try:
                 draft.fill(result.files)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from semidense.cache import InvalidArray, Recipe, Result, Values, encode
+from semidense.cache import Encoded, InvalidArray, Recipe, Values, encode
 from semidense.pipeline.execution import tasks
 from semidense.pipeline.execution.claims import RunStopped
 from semidense.pipeline.execution.jobs import Context, explained, explained_at, flat
@@ -61,7 +61,7 @@ class _Batch:
         self.made = made
         self._context = context
         self._claimed: str | None = None
-        self._results: dict[str, Result] = {}
+        self._results: dict[str, Encoded] = {}
         self._arrays: dict[str, dict[str, Labelled]] = {}
 
     def add(self, step: Step, forced: bool) -> None:

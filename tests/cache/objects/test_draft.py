@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from semidense.cache import (
+    Encoded,
     IncompleteDraft,
     InvalidArray,
     NonDeterministicStage,
     Recipe,
-    Result,
     Store,
     Values,
     encode,
@@ -98,7 +98,7 @@ def _below(store: Store, prefix: str) -> list[Listed]:
 def test_results_are_published_together_with_the_digests_of_a_folder(
     objects_store: Store, store: Store, values: np.ndarray
 ) -> None:
-    def result(number: int) -> Result:
+    def result(number: int) -> Encoded:
         recipe = Recipe("square", {"squares": "1f"}, {"n": number}, {"images": "ab"}, {})
         arrays = {"map": Values(values, (2, 3), ("y", "x"), {}), "x": Values(np.arange(3), (3,), ("x",), {})}
         return encode(recipe, {"scene": "Teddy"}, arrays, 1.5, {}, "step")

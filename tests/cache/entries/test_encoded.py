@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from semidense.cache import (
+    Encoded,
     Entry,
     InvalidArray,
     InvalidRecipe,
     NonDeterministicStage,
     Recipe,
-    Result,
     Store,
     Values,
     encode,
@@ -32,13 +32,13 @@ def recipe_of(number: int) -> Recipe:
     return Recipe("square", {"squares": "1f"}, {"n": number}, {"images": "ab"}, {"zarr": "3"})
 
 
-def result_of(number: int, values: np.ndarray) -> Result:
+def result_of(number: int, values: np.ndarray) -> Encoded:
     return encode(
         recipe_of(number), {"scene": "Teddy"}, {"map": Values(values, (2, 3), ("y", "x"), {"units": "px"})}, 1.5, {}
     )
 
 
-def publish_all(store: Store, *results: Result) -> list[Entry]:
+def publish_all(store: Store, *results: Encoded) -> list[Entry]:
     with store.lease() as lease:
         return store.publish_all(results, lease)
 

@@ -1,4 +1,4 @@
-"""A small result in memory: encoded as its files, hashed, and yet to be published."""
+"""A small result in memory, encoded: the bytes of its files and their digest, yet to be published."""
 
 import hashlib
 from collections.abc import Mapping, Sequence
@@ -31,7 +31,7 @@ class Values(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Result:
+class Encoded:
     """A result whose digest is known and which nobody sees yet; ``Store.publish_all`` takes several of one writer.
 
     Attributes:
@@ -69,7 +69,7 @@ def encode(
     seconds: float,
     extras: Mapping[str, Any],
     maker: str = "",
-) -> Result:
+) -> Encoded:
     """Return a result with the very files that a draft of these arrays would have.
 
     Raises:
@@ -87,4 +87,4 @@ def encode(
         for path, chunk in chunks_of(f"array {name!r} of {recipe.stage}", about, region, array):
             files[f"{DATA}/{name}/{path}"] = encoded(chunk)
     rows = [File(path, len(data), hashlib.sha256(data).hexdigest()) for path, data in sorted(files.items())]
-    return Result(recipe, plain_mapping("label", label), files, Manifest(tuple(rows)), seconds, extras, maker)
+    return Encoded(recipe, plain_mapping("label", label), files, Manifest(tuple(rows)), seconds, extras, maker)
