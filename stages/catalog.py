@@ -11,6 +11,7 @@ from importlib.metadata import EntryPoint, entry_points
 from semidense.stages.baselines.declaration import BASELINES, MATCHED
 from semidense.stages.disparity.declaration import (
     AGGREGATED,
+    ALIGNMENT,
     DISPARITY,
     FILLED,
     REFINED,
@@ -32,6 +33,7 @@ from semidense.stages.transforms.declaration import CHANNELS
 
 CATALOG: tuple[Stage, ...] = (
     SURVEY,
+    ALIGNMENT,
     CHANNELS,
     MATCHING_SAMPLES,
     MATCHING_NET,

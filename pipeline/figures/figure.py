@@ -23,7 +23,7 @@ from semidense.pipeline.figures.maps import (
     draw_truth,
 )
 from semidense.pipeline.figures.metrics_table import draw_metrics
-from semidense.pipeline.figures.survey import draw_survey
+from semidense.pipeline.figures.survey import draw_alignment, draw_survey
 from semidense.pipeline.figures.training import (
     draw_evaluation_samples,
     draw_foreign_samples,
@@ -46,6 +46,7 @@ _DRAW: Mapping[str, Callable[..., None]] = {
     "images": draw_images,
     "truth": draw_truth,
     "survey": draw_survey,
+    "alignment": draw_alignment,
     "channels": draw_channels,
     "matching_samples": draw_matching_samples,
     "matching_net": draw_network,

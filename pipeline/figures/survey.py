@@ -1,4 +1,4 @@
-"""Draw the survey of a pair: how far each match moved along its row and across it."""
+"""Draw what a look at a pair found: how far each match moved along its row and across it."""
 
 import numpy as np
 import xarray as xr
@@ -13,6 +13,8 @@ from semidense.stages.disparity.survey import FIELDS
 
 _LEAST_SPAN = 2.0
 """Least vertical offset at the ends of its scale, px."""
+_LEAST_SHIFT = 0.5
+"""The same where offsets are measured to a fraction of a pixel."""
 
 
 def draw_survey(figure: Figure, dataset: xr.Dataset) -> None:
@@ -27,6 +29,20 @@ def draw_survey(figure: Figure, dataset: xr.Dataset) -> None:
     _draw_matches(axes[1], view, step, matches, "vertical", cost_colours())
     middle = f"median {np.median(matches['vertical']):+.1f} px" if matches["y"].size else "none measured"
     axes[1].set_title(f"vertical offset, 0 in a rectified pair: {middle}")
+
+
+def draw_alignment(figure: Figure, dataset: xr.Dataset) -> None:
+    """Draw how far the right view lies below the left one, and as dots on it where that was measured."""
+    offset = dataset["rows"].values[:, None] + dataset["columns"].values
+    y, x, measured = dataset["offsets"].values.T
+    (axes,) = image_panels(figure, offset.shape, columns=1)[0]
+    low, high = _span(np.append(measured, [offset.min(), offset.max()]), centred=True, least=_LEAST_SHIFT)
+    axes.imshow(offset, cmap=cost_colours(), vmin=low, vmax=high)
+    dots = axes.scatter(x, y, c=measured, s=8, cmap=cost_colours(), vmin=low, vmax=high, edgecolors="black", lw=0.2)
+    label = "vertical offset, right minus left (px)"
+    axes.figure.colorbar(dots, cax=axes.inset_axes((1.02, 0, 0.035, 1)), label=label)
+    told = f"rows are shifted by {offset.min():+.2f} to {offset.max():+.2f} px" if offset.any() else "no row is shifted"
+    axes.set_title(f"{len(measured)} places of the right view; {told}")
 
 
 def _draw_matches(
@@ -46,8 +62,8 @@ def _draw_matches(
     axes.figure.colorbar(dots, cax=axes.inset_axes((1.02, 0, 0.035, 1)), label=label)
 
 
-def _span(values: NDArray[np.float32], centred: bool) -> tuple[float, float]:
+def _span(values: NDArray[np.float32], centred: bool, least: float = _LEAST_SPAN) -> tuple[float, float]:
     """Return the values of the first and last colour; 1 % at each end may lie beyond."""
     low, high = np.percentile(values, (1, 99)) if values.size else (0.0, 1.0)
-    reach = max(_LEAST_SPAN, abs(low), abs(high))
+    reach = max(least, abs(low), abs(high))
     return (-reach, reach) if centred else (float(low), float(high))

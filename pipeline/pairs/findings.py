@@ -17,7 +17,11 @@ _LEAST_OFFSET = 1.0
 
 
 def findings(
-    survey: Mapping[str, Array], searched: DisparityRange | None, known: Calibration | None = None
+    survey: Mapping[str, Array],
+    searched: DisparityRange | None,
+    known: Calibration | None = None,
+    *,
+    aligned: bool = False,
 ) -> list[str]:
     """Return one line for each problem of a pair; an empty list for a sound pair.
 
@@ -25,6 +29,7 @@ def findings(
         survey: the product's arrays.
         searched: the range of disparities that the user gave; None if an end of it is estimated.
         known: the pair's calibration: a point at infinity has the disparity ``-doffs``.
+        aligned: the rows of the right view are shifted for the matching.
     """
     if survey["equal"][0] >= _EQUAL:
         return [f"the two views are the same picture ({100 * survey['equal'][0]:.1f} % of their pixels are equal)"]
@@ -34,7 +39,7 @@ def findings(
     step = float(survey["step"][0])
     return [
         *_exchanged(matches["disparity"], step, searched, known.doffs if known else 0.0),
-        *_unrectified(matches["vertical"], step),
+        *_unrectified(matches["vertical"], step, aligned),
     ]
 
 
@@ -67,11 +72,12 @@ def _exchanged(disparity: Array, step: float, searched: DisparityRange | None, d
         )
 
 
-def _unrectified(vertical: Array, step: float) -> Iterator[str]:
+def _unrectified(vertical: Array, step: float, aligned: bool) -> Iterator[str]:
     low, middle, high = np.percentile(vertical, (_TAIL, 50, 100 - _TAIL))
     if abs(middle) >= max(_LEAST_OFFSET, step / 2) or high - low >= max(2 * _LEAST_OFFSET, 2 * step):
+        shifted = "; its rows were shifted, so the map may be right and the depth is not" if aligned else ""
         yield (
             f"the pair looks unrectified: the right view lies {middle:+.0f} px ({low:+.0f} to {high:+.0f}, measured to "
-            f"{step:g} px) below the left one, where it should lie level; rectify it first with "
+            f"{step:g} px) below the left one, where it should lie level{shifted}; rectify it first with "
             "`pipeline rectify LEFT RIGHT --calib STEREO_YAML` (docs/own-pictures.md says how to get the calibration)"
         )

@@ -166,7 +166,19 @@ class Match:
     def misfits(self) -> list[str]:
         """Those of the warnings that tell how the views do not fit together: a picture of ``survey`` shows where."""
         searched = None if self.scene.open_ends else self.disparities
-        return findings(self.survey, searched, self.scene.calibration)
+        return findings(self.survey, searched, self.scene.calibration, aligned=self.shifts is not None)
+
+    @cached_property
+    def shifts(self) -> tuple[float, float] | None:
+        """How far the rows of the right view were shifted for the matching, px: least and most; None: not at all."""
+        made = self._find("alignment")
+        if made is None:
+            return None
+        arrays = self.result.store.arrays(made.key)
+        rows, columns = (np.asarray(arrays[name][...], np.float64) for name in ("rows", "columns"))
+        if not (rows.any() or columns.any()):
+            return None
+        return float(rows.min() + columns.min()), float(rows.max() + columns.max())
 
     def made(self, product: str) -> Made:
         """Return the result of one of the pair's products.

@@ -250,6 +250,7 @@ def summary(match: Match) -> dict[str, Any]:
         "columns": match.scene.size[1],
         "reference_view": "left",
         "disparities": asdict(match.disparities) | {"estimated": list(match.scene.open_ends)},
+        "rows_shifted_px": match.shifts,
         "R": match.R,
         **_basis(match),
         "wishes": asdict(wishes),

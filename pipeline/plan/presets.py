@@ -5,6 +5,7 @@ from collections.abc import Mapping
 PRESETS: Mapping[str, tuple[str, ...]] = {
     "paper": (),
     "robust": (
+        "channels.align=true",
         "costvolume.mode=fast",
         "use.disparity=aggregated",
         "use.right_disparity=right_aggregated",

@@ -1,4 +1,4 @@
-"""Declare the disparity maps of both views and what follows them: refinement and filling. Loads no numba."""
+"""Declare the alignment of the views, the disparity maps of both and what follows them. Loads no numba."""
 
 from typing import Literal, NotRequired, TypedDict
 
@@ -7,6 +7,18 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from semidense.stages.stage import CostVolume, DisparityMap, Output, Params, Stage
+
+ALIGNMENT = Stage(
+    product="alignment",
+    inputs=("images", "survey"),
+    outputs=(
+        Output("rows", ("y",), "float32", "px", "how far the right view lies below the left one: the part of a row"),
+        Output("columns", ("x",), "float32", "px", "the part of a column of the right view; the offset is their sum"),
+        Output("offsets", ("match", "place"), "float32", "px", "row and column in the right view, and offset measured"),
+    ),
+    compute="semidense.stages.disparity.alignment:compute_alignment",
+)
+"""What ``channels.align`` shifts the right view's rows by. Not tiled: a plane is one of the whole image."""
 
 
 class DisparityParams(Params):

@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.stage import OfImages, StageError
+from semidense.stages.stage import StageError
 from semidense.stages.transforms.companion import companion
-from semidense.stages.transforms.declaration import Channels, ChannelsParams
-from semidense.stages.transforms.gray import gray_moments, to_gray
+from semidense.stages.transforms.declaration import Channels, ChannelsParams, OfViews
+from semidense.stages.transforms.gray import gray_moments, gray_views, to_gray
 from semidense.stages.transforms.rank import rank
+from semidense.stages.transforms.shift import shifted_rows
 
 
 def channels(
@@ -66,7 +67,10 @@ def _levels(params: ChannelsParams, mean: float, std: float) -> NDArray[np.float
     return value.astype(np.float32)
 
 
-def compute_channels(params: ChannelsParams, inputs: OfImages) -> Channels:
-    """Compute the product ``channels`` of an image or of a block of it; see ``channels``."""
+def compute_channels(params: ChannelsParams, inputs: OfViews) -> Channels:
+    """Compute the product ``channels`` of an image or of a block of it; see ``channels`` and ``shifted_rows``."""
     images = inputs["images"]
-    return {"channels": channels(images["left"], images["right"], params, images["moments"])}
+    left, right = gray_views(images)
+    if params.align:
+        right = shifted_rows(right, inputs["alignment"]["rows"], inputs["alignment"]["columns"])
+    return {"channels": channels(left, right, params, images["moments"])}

@@ -1,18 +1,21 @@
 """What the channels are made from, and what can be set. Light: it does not load numba."""
 
-from typing import Literal, TypedDict
+from typing import Literal, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from semidense.stages.stage import Output, Params, Stage
+from semidense.stages.stage import Images, Output, Params, Stage
 from semidense.stages.transforms.rays import require_rays
+from semidense.stages.transforms.shift import TAPS
 from semidense.stages.transforms.window import require_window
 
 Channel = Literal["gray", "rank", "companion"]
 ORDER: tuple[Channel, ...] = ("gray", "rank", "companion")
 """The order of the channel axis."""
+LARGEST_OFFSET = 8.0
+"""Largest vertical offset of the right view that is corrected, px."""
 
 
 class ChannelsParams(Params):
@@ -27,6 +30,12 @@ class ChannelsParams(Params):
     )
     use: tuple[Channel, ...] = Field(
         default=ORDER, min_length=1, description="channels that the networks see, in the order gray, rank, companion"
+    )
+
+    align: bool = Field(
+        default=False,
+        description="shift the rows of the right view to those of the left one, by what the pair itself tells; "
+        "off in the paper",
     )
 
     @field_validator("rank_window", "companion_window")
@@ -50,6 +59,34 @@ class ChannelsParams(Params):
         windows = {"gray": 1, "rank": self.rank_window, "companion": self.companion_window}
         return max(windows[channel] for channel in self.use) // 2
 
+    @property
+    def halo(self) -> int:
+        """Rows of context that a tile needs above and below, px."""
+        return self.reach + (int(LARGEST_OFFSET) + TAPS if self.align else 0)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The products that these settings need."""
+        return ("images", "alignment") if self.align else ("images",)
+
+
+class Alignment(TypedDict):
+    """The product ``alignment``: (y,) and (x,) px; the right view's pixel of row y lies at y + rows[y] + columns[x].
+
+    ``offsets`` (match, 3) are what it was measured by: row and column in the right view, and offset, px.
+    """
+
+    rows: NDArray[np.float32]
+    columns: NDArray[np.float32]
+    offsets: NDArray[np.float32]
+
+
+class OfViews(TypedDict):
+    """What channels are made from; the alignment only where the settings need it."""
+
+    images: Images
+    alignment: NotRequired[Alignment]
+
 
 class Channels(TypedDict):
     """The product ``channels``: (view, channel, y, x)."""
@@ -59,7 +96,7 @@ class Channels(TypedDict):
 
 CHANNELS = Stage(
     product="channels",
-    inputs=("images",),
+    inputs=("images", "alignment"),
     outputs=(
         Output(
             "channels",
@@ -72,8 +109,9 @@ CHANNELS = Stage(
     compute="semidense.stages.transforms.channels:compute_channels",
     params=ChannelsParams,
     tile_rows=128,
-    halo=lambda params: params.reach,
+    halo=lambda params: params.halo,
     sizes=lambda params: {"view": 2, "channel": len(params.use)},
 )
 """Channels of a scene. ``images`` has ``left`` and ``right`` (y, x, band) uint8 or uint16 and ``moments``
-(view, moment) float64: the gray moments of each whole view, so that a tile standardises as the whole image does."""
+(view, moment) float64: the gray moments of each whole view, so that a tile standardises as the whole image does.
+Only those inputs are made that the settings need."""

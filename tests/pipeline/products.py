@@ -48,6 +48,16 @@ def channels() -> xr.Dataset:
     return xr.Dataset({"channels": (("view", "channel", "y", "x"), values)})
 
 
+def alignment() -> xr.Dataset:
+    return xr.Dataset(
+        {
+            "rows": ("y", np.linspace(-0.1, 0.1, 4, dtype=np.float32)),
+            "columns": ("x", np.linspace(0.2, 0.4, 6, dtype=np.float32)),
+            "offsets": (("match", "place"), np.float32([[1, 2, 0.3], [3, 4.5, 0.4], [0, 1, 0.1]])),
+        }
+    )
+
+
 def matching_samples() -> xr.Dataset:
     truth = np.tile(np.array([[1, 2, N], [1, 3, 3]], np.float32), (8, 1, 1))
     return xr.Dataset(
@@ -165,6 +175,7 @@ PRODUCTS: dict[str, Callable[[], xr.Dataset]] = {
     "images": images,
     "truth": truth,
     "survey": survey,
+    "alignment": alignment,
     "channels": channels,
     "matching_samples": matching_samples,
     "matching_net": network,

@@ -196,6 +196,10 @@ def _say(match: "Match", about: dict[str, Any]) -> None:
     low, high = match.disparities.minimum, match.disparities.maximum
     ends = " (estimated from the images)" if match.scene.open_ends else ""
     print(f"{match.scene.name}: {about['rows']} x {about['columns']} px, disparities {low} to {high} px{ends}")
+    if match.shifts:
+        print(
+            "  shifted the rows of the right view by {:+.1f} to {:+.1f} px to those of the left".format(*match.shifts)
+        )
     kept = about["density_percent"] - about["guessed_percent"]
     print(f"  kept {kept:.1f} % of the pixels, at R = {told(match.R)} ({about['R_from']})")
     if "R_basis" in about:

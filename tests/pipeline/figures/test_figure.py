@@ -93,6 +93,14 @@ def test_every_product_of_the_pipeline_has_a_figure() -> None:
             id="matches-on-the-view",
         ),
         pytest.param(
+            "alignment",
+            [
+                "3 places of the right view; rows are shifted by +0.10 to +0.50 px",
+                "vertical offset, right minus left (px)",
+            ],
+            id="offsets-on-their-plane",
+        ),
+        pytest.param(
             "metrics", ["threshold\n(px)", "raw\nbad\n%", "rms\npx", "nonocc", "1,234", "-"], id="readable-table"
         ),
     ],

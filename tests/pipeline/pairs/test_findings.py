@@ -42,6 +42,12 @@ def test_what_looks_wrong_is_said_in_one_line(found: dict[str, np.ndarray], expe
             raise ValueError(said[0])
 
 
+def test_rows_that_were_shifted_are_told() -> None:
+    (alone,), (aligned,) = (findings(survey(20, 4), None, aligned=each) for each in (False, True))
+    assert "its rows were shifted" in aligned and "its rows were shifted" not in alone
+    assert findings(survey(20, 0.4), None, aligned=True) == []
+
+
 @pytest.mark.parametrize(("low", "warned"), [(-30, False), (0, True)])
 def test_negative_disparities_that_were_asked_for_are_no_surprise(low: int, warned: bool) -> None:
     assert bool(findings(survey(-20), DisparityRange(low, 30))) == warned
