@@ -135,7 +135,8 @@ def _transformed(net: MatchingNet, views: Tensor, precision: Precision) -> Costs
 
 def compute_costs(params: CostVolumeParams, inputs: OfNetworks) -> CostVolume:
     """Return one tile of the volume: ``cost`` float16 (y, x, d) and its coordinate ``d`` int16."""
-    return {"cost": _costs(params, inputs).astype(np.float16), "d": np.array(params.disparities, np.int16)}
+    costs = torch.from_numpy(_costs(params, inputs)).half()  # NumPy rounds to the same, one number at a time
+    return {"cost": costs.numpy(), "d": np.array(params.disparities, np.int16)}
 
 
 def _costs(params: CostVolumeParams, inputs: OfNetworks) -> NDArray[np.float32]:

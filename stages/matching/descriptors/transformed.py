@@ -3,11 +3,12 @@
 A kernel whose taps lie s px apart treats every s-th pixel of every s-th row as an image of its own; a tile is four
 rows and columns of such an image, and so are the pixels that it answers. From layer to layer
 
-    split      transform 6 x 6 tiles, s px between their pixels                  (tile, 36, 64)
+    split      transform 6 x 6 tiles, s px between their pixels                  (36, tile, 64)
     product    with the layer's transformed kernels                              (36, tile, 64)
     merge      transform back, add the bias, cut at a floor                      (y, x, 64)
 
-for some tiles at a time, so that they stay in the processor's cache. The first layer has too few channels to gain.
+for some tiles at a time, so that they stay in the processor's cache. A number's tiles lie side by side, as the product
+takes them: of another order it would make a copy first. The first layer has too few channels to gain.
 What is multiplied, and what comes of it, is float32 or bfloat16, as in ``transformed``.
 """
 
@@ -33,6 +34,7 @@ from semidense.stages.matching.winograd.tiles import (
     inverse6,
     load6,
     pick6,
+    place6,
     spread,
     store4,
     store6,
@@ -71,7 +73,7 @@ def six_pixels(maps: NDArray[np.float32], y: int, x: int, step: int) -> Six[Stor
 
 @kernel
 def split(maps: NDArray[np.float32], first: int, count: int, step: int, tiles: Stored) -> None:
-    """Transform the tiles of maps (y, x, WIDTH) from tile ``first`` on: (tile, 36, WIDTH)."""
+    """Transform ``count`` tiles of maps (y, x, WIDTH) from tile ``first`` on, into (36, tile, WIDTH)."""
     row = 6 * WIDTH
     part = np.empty(6 * row, np.float32)  # one tile, transformed along its rows
     for tile in range(count):
@@ -80,9 +82,10 @@ def split(maps: NDArray[np.float32], first: int, count: int, step: int, tiles: S
             pixels, line = six_pixels(maps, y + k * step, x, step), part[k * row : (k + 1) * row]
             for c in range(WIDTH):
                 store6(line, WIDTH, c, forward6(pick6(pixels, c)))
-        out = tiles[tile * 6 * row : (tile + 1) * 6 * row]
-        for c in range(row):
-            store6(out, row, c, forward6(load6(part, row, c)))
+        for j in range(6):
+            column, out = part[j * WIDTH :], gather6(tiles, j, tile)
+            for c in range(WIDTH):
+                place6(out, c, forward6(load6(column, row, c)))
 
 
 @kernel
@@ -126,13 +129,13 @@ def convolved(maps: Tensor, weight: Tensor, bias: Tensor, floor: float, step: in
     """
     made = torch.empty(maps.shape[0] - 2 * step, maps.shape[1] - 2 * step, WIDTH)
     total = made.shape[0] * made.shape[1] // TILE**2
-    tiles = torch.empty(TILES, 36, WIDTH, dtype=weight.dtype)
+    tiles = torch.empty(36, TILES, WIDTH, dtype=weight.dtype)
     products = torch.empty(36 * TILES * WIDTH, dtype=weight.dtype)
     for first in range(0, total, TILES):
         count = min(TILES, total - first)
-        split(maps.numpy(), first, count, step, stored(tiles.view(-1)))
+        split(maps.numpy(), first, count, step, stored(tiles))
         answers = products[: 36 * count * WIDTH].view(36, count, WIDTH)
-        torch.bmm(tiles[:count].transpose(0, 1), weight, out=answers)
+        torch.bmm(tiles[:, :count], weight, out=answers)
         merge(stored(answers), bias.numpy(), np.float32(floor), first, step, made.numpy())
     return made
 

@@ -111,13 +111,13 @@ class _Convolved(torch.autograd.Function):
         given = (given * (made > ctx.floor)).contiguous()
         maps_gradient, weight_gradient = torch.zeros_like(maps), torch.zeros_like(weight)
         total = made.shape[0] * made.shape[1] // TILE**2
-        tiles, products = torch.empty(TILES, 36, WIDTH), torch.empty(TILES, 36, WIDTH)
+        tiles, products = torch.empty(36, TILES, WIDTH), torch.empty(TILES, 36, WIDTH)
         for first in range(0, total, TILES):
             count = min(TILES, total - first)
-            split(maps.numpy(), first, count, ctx.step, tiles.view(-1).numpy())
+            split(maps.numpy(), first, count, ctx.step, tiles.numpy())
             _merge_transposed(given.numpy(), first, count, ctx.step, products.view(-1).numpy())
             answers = products[:count].transpose(0, 1)
-            weight_gradient.baddbmm_(tiles[:count].permute(1, 2, 0), answers)
+            weight_gradient.baddbmm_(tiles[:, :count].transpose(1, 2), answers)
             back = torch.bmm(answers, weight.transpose(1, 2))
             _split_transposed(back.numpy(), first, ctx.step, maps_gradient.numpy())
         return maps_gradient, weight_gradient, given.sum((0, 1)), None, None

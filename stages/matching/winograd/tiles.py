@@ -139,6 +139,13 @@ def store6(p: Stored, n: int, c: int, v: Six[np.float32]) -> None:
 
 
 @inlined
+def place6(p: Six[Stored], c: int, v: Six[np.float32]) -> None:
+    """Write channel ``c`` of six numbers that ``gather6`` found."""
+    p[0][c], p[1][c], p[2][c] = rounded(v[0], p[0]), rounded(v[1], p[1]), rounded(v[2], p[2])
+    p[3][c], p[4][c], p[5][c] = rounded(v[3], p[3]), rounded(v[4], p[4]), rounded(v[5], p[5])
+
+
+@inlined
 def store8(p: Stored, n: int, c: int, v: Eight[np.float32]) -> None:
     """Write channel ``c`` of eight numbers of ``n`` channels."""
     p[c], p[n + c], p[2 * n + c] = rounded(v[0], p), rounded(v[1], p), rounded(v[2], p)
