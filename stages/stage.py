@@ -152,7 +152,9 @@ class Stage:
             looking at the cache do not load torch.
         params: the section of the configuration whose fields enter the key.
         scope: ``scene`` (one product a scene) or ``split`` (one for all training scenes).
-        tile_rows: rows a tile; None if it needs the whole image at once.
+        tile_rows: rows a tile, and a chunk of its arrays; None if it needs the whole image at once.
+        chunks_a_tile: how many chunks of rows one tile makes instead, from the parameters and the image's columns: of a
+            stage whose halo costs much, and whose numbers do not depend on where its tiles begin.
         halo: pixels of context that a tile needs on each side, from the parameters.
         border: what a tile sees beyond the image. ``cut``: nothing, the block ends at the image
             and the output has the block's size (the runner trims the halo). ``edge``: the nearest
@@ -176,6 +178,7 @@ class Stage:
     params: type[Params] = NoParams
     scope: Scope = "scene"
     tile_rows: int | None = None
+    chunks_a_tile: Callable[[Any, int], int] = lambda _params, _width: 1
     halo: Callable[[Any], int] = lambda _: 0
     border: Border = "cut"
     sizes: Callable[[Any], Mapping[str, int]] = lambda _: {}

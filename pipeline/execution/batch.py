@@ -123,7 +123,7 @@ class _Batch:
         height, width = step.size or (0, 0)
         sizes = {"y": height, "x": width, **step.stage.sizes(step.params)}
         made = {each.name: np.empty([sizes[dim] for dim in each.dims], each.dtype) for each in step.stage.outputs}
-        for rows in cut_rows(height, step.stage.tile_rows or height):
+        for rows in cut_rows(height, step.tile_rows or height):
             with explained(step, str(rows)), self._context.room(step):
                 opened = {product: self._open(ids[0]) for product, ids in keys.items()}
                 part = tasks.compute_tile(step, opened, rows)

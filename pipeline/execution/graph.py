@@ -116,10 +116,10 @@ def _add_step(graph: dict[str, Any], step: Step, plan: Plan, shared: Any, result
     add = partial(_add_task, graph, step.product)
     own, forced = _add_value(graph, step.product, step), step.product in plan.forced
     job = add(tasks.begin, shared, own, _inputs([step], results), forced, step.tiles)
-    if step.stage.tile_rows is None or step.size is None:
+    if step.tile_rows is None or step.size is None:
         parts = [add(tasks.make_whole, shared, job)]
     else:
         ready = add(tasks.create_arrays, job)
-        rows = cut_rows(step.size[0], step.stage.tile_rows)
+        rows = cut_rows(step.size[0], step.tile_rows)
         parts = [add(tasks.make_tile, shared, ready, _add_value(graph, "rows", each)) for each in rows]
     return add(tasks.publish, shared, job, List(*parts))

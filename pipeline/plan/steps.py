@@ -96,11 +96,18 @@ class Step:
         return f"{self.product} of {self.scene}"
 
     @property
+    def tile_rows(self) -> int | None:
+        """Rows of one of its tiles; None if it is not tiled."""
+        if self.stage.tile_rows is None or self.size is None:
+            return None
+        return self.stage.tile_rows * self.stage.chunks_a_tile(self.params, self.size[1])
+
+    @property
     def tiles(self) -> int:
         """How many tasks make it: one a tile."""
-        if self.stage.tile_rows is None or self.size is None:
+        if self.tile_rows is None or self.size is None:
             return 1
-        return -(-self.size[0] // self.stage.tile_rows)
+        return -(-self.size[0] // self.tile_rows)
 
     @property
     def declared_bytes(self) -> int | None:

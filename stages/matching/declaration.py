@@ -24,6 +24,12 @@ REACH = sum(DILATIONS)
 """Pixels that a descriptor looks away from its own."""
 MARGIN = 4 + REACH
 """Pixels around a tile that propose to it in a guided volume, and what their descriptors see."""
+CHUNK = 32
+"""Rows of a chunk of the volume."""
+NUMBERS = 1 << 25
+"""Most numbers of a fast volume's tile that has more than one chunk: 128 MB."""
+_BESIDE = 4 * 64
+"""Numbers a pixel beside its costs: the descriptors of both views, and two layers on the way to one of them."""
 
 
 class MatchingSamplesParams(Params):
@@ -271,6 +277,16 @@ DESCRIPTOR_NET = Stage(
 )
 
 
+def _chunks_a_tile(params: CostVolumeParams, width: int) -> int:
+    """Return how many chunks of rows a tile of the volume makes.
+
+    Of a fast one as many as ``NUMBERS`` allows, at most 4: a tile computes all layers for its context anew.
+    """
+    if params.mode != "fast":
+        return 1
+    return min(4, max(1, NUMBERS // (CHUNK * width * (len(params.disparities) + _BESIDE))))
+
+
 COST_VOLUME = Stage(
     product="costvolume",
     inputs=("channels", "matching_net", "descriptor_net"),
@@ -280,7 +296,8 @@ COST_VOLUME = Stage(
     ),
     compute="semidense.stages.matching.cost_volume:compute_costs",
     params=CostVolumeParams,
-    tile_rows=32,
+    tile_rows=CHUNK,
+    chunks_a_tile=_chunks_a_tile,
     halo=lambda params: params.context,
     border="edge",
     sizes=lambda params: {"d": len(params.disparities)},

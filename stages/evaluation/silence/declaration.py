@@ -92,6 +92,6 @@ COST_MARGIN = Stage(
         ),
     ),
     compute="semidense.stages.evaluation.silence.cost_margin:compute_cost_margin",
-    tile_rows=32,
+    tile_rows=64,
 )
-"""Where the costs cannot tell it. A tile has the rows of one chunk of the volume, so that each chunk is read once."""
+"""Where the costs cannot tell it. A tile has the rows of two chunks of the volume, so that each chunk is read once."""

@@ -19,7 +19,7 @@ from semidense.pipeline.plan.plan import Made, Plan
 from semidense.pipeline.plan.steps import Graph
 from semidense.stages.stage import Stage
 from tests.pipeline import toy
-from tests.pipeline.toy import BLURRED, CALLS, RAMP, SUM, Offset, chain, graph, states, step
+from tests.pipeline.toy import BLURRED, CALLS, RAMP, SUM, WIDTH, Offset, chain, graph, states, step
 
 ToyPlan = Callable[..., Plan]
 ToyRun = Callable[..., dict[str, Made]]
@@ -45,6 +45,17 @@ def test_a_tiled_stage_runs_once_a_tile_and_writes_what_has_no_rows_once(toy_run
     assert sorted(CALLS) == ["blurred"] * 3 + ["ramp", "sum"], "10 rows in tiles of 4"
     assert values(store, made["blurred"], "level").tolist() == [7]
     assert store.arrays(made["blurred"].key)["values"].chunks == (4, 4)
+
+
+@pytest.mark.parametrize(("chunks", "tiles"), [(1, 3), (2, 2), (3, 1), (9, 1)])
+def test_a_tile_can_make_several_chunks(toy_run: ToyRun, store: Store, chunks: int, tiles: int) -> None:
+    """There are fewer tasks, and the same files."""
+    usual = toy_run(chain(reach=1))["blurred"]
+    CALLS.clear()
+    wide = replace(BLURRED, chunks_a_tile=lambda params, width: params.reach * chunks * width // WIDTH)
+    made = toy_run(chain(reach=1, code="2e", stage=wide))["blurred"]
+    assert CALLS.count("blurred") == tiles == made.step.tiles
+    assert (made.digest, made.key != usual.key) == (usual.digest, True)
 
 
 @pytest.mark.parametrize("rows", [1, 3, 4, 9, 10, 64])

@@ -8,6 +8,7 @@ from semidense.stages.matching.declaration import (
     CostVolumeParams,
     MatchingNetParams,
     MatchingSamplesParams,
+    Mode,
 )
 from semidense.stages.stage import StageError
 
@@ -34,6 +35,22 @@ def test_the_range_includes_both_ends() -> None:
     params = CostVolumeParams(d_min=-2, d_max=1)
     assert list(params.disparities) == [-2, -1, 0, 1]
     assert COST_VOLUME.sizes(params) == {"d": 4}
+
+
+@pytest.mark.parametrize(
+    ("mode", "width", "d_max", "chunks"),
+    [
+        pytest.param("fast", 741, 70, 4, id="fast: a wide tile has less context"),
+        pytest.param("fast", 1000, 99, 2, id="fast, larger: what memory allows"),
+        pytest.param("fast", 3000, 280, 1, id="fast, large: never less than a chunk"),
+        pytest.param("exact", 741, 70, 1, id="exact: a tile is a chunk"),
+        pytest.param("guided", 741, 70, 1, id="guided: where a tile begins decides what proposes to it"),
+    ],
+)
+def test_a_tile_of_a_fast_volume_has_as_many_chunks_as_memory_allows(
+    mode: Mode, width: int, d_max: int, chunks: int
+) -> None:
+    assert COST_VOLUME.chunks_a_tile(CostVolumeParams(mode=mode, d_min=0, d_max=d_max), width) == chunks
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from torch.nn import functional
 
 from semidense.stages.compute.precision import Precision
 from semidense.stages.learning.parameters import initialise, to_vector
-from semidense.stages.matching.declaration import COST_VOLUME, DILATIONS, REACH, CostVolumeParams
+from semidense.stages.matching.declaration import CHUNK, COST_VOLUME, DILATIONS, REACH, CostVolumeParams
 from semidense.stages.matching.descriptors import volume as module
 from semidense.stages.matching.descriptors.net import DescriptorNet, descriptor_net_from_parameters
 from semidense.stages.matching.descriptors.volume import diagonals, fast_cost_volume
@@ -114,6 +114,18 @@ def test_tiles_equal_the_whole() -> None:
     one, other = tiled(COST_VOLUME, params, given, DIMS, 8), whole(COST_VOLUME, params, given, DIMS)
     assert np.array_equal(one["d"], other["d"]) and other["cost"].dtype == np.float16
     assert np.allclose(one["cost"], other["cost"], rtol=2**-9, atol=1e-3, equal_nan=True)
+
+
+@pytest.mark.parametrize("precision", ["float32", "bfloat16"])
+def test_chunks_that_a_tile_makes_together_are_those_it_makes_alone(precision: Precision) -> None:
+    """To the rounding of a float16: the products of matrices of another size may add in another order."""
+    given = {
+        "channels": shifted_scene(height=70, width=40)["channels"],
+        "descriptor_net": {"parameters": to_vector(random_descriptor_net())},
+    }
+    params = CostVolumeParams(d_min=-2, d_max=9, precision=precision, mode="fast")
+    one, other = (tiled(COST_VOLUME, params, given, DIMS, rows)["cost"] for rows in (CHUNK, 3 * CHUNK))
+    assert np.allclose(one, other, rtol=2**-10, atol=1e-3, equal_nan=True)
 
 
 def test_diagonals_by_hand() -> None:
