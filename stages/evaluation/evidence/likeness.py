@@ -69,28 +69,34 @@ def support(disparity: NDArray[np.float32], gray: NDArray[np.uint8]) -> NDArray[
     """
     found = np.empty([length - 2 * RADIUS for length in disparity.shape], np.float32)
     weights = np.exp(-np.arange(256) / CONTRAST).astype(np.float32)
-    _write_support(np.ascontiguousarray(disparity), gray.astype(np.int64), weights, np.float32(TOLERANCE), found)
+    _write_support(np.ascontiguousarray(disparity), gray.astype(np.int32), weights, np.float32(TOLERANCE), found)
     return found
 
 
 @kernel
 def _write_support(
     disparity: NDArray[np.float32],
-    gray: NDArray[np.int64],
+    gray: NDArray[np.int32],
     weights: NDArray[np.float32],
     tolerance: np.float32,
     found: NDArray[np.float32],
 ) -> None:
+    """Add one neighbour of all pixels of a row, then the next: so many are weighed at once."""
     height, width = found.shape
+    agreeing, total, weight = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
     for y in range(RADIUS, RADIUS + height):
-        for x in range(RADIUS, RADIUS + width):
-            agreeing, total = np.float32(0), np.float32(0)
-            for row in range(y - SUPPORT_RADIUS, y + SUPPORT_RADIUS + 1, SUPPORT_STEP):
-                for column in range(x - SUPPORT_RADIUS, x + SUPPORT_RADIUS + 1, SUPPORT_STEP):
-                    # The pixel itself is left out here: beside it the weights of unlike neighbours would be lost.
-                    own = row == y and column == x
-                    weight = np.float32(0) if own else weights[abs(gray[row, column] - gray[y, x])]
-                    total += weight
-                    if abs(disparity[row, column] - disparity[y, x]) <= tolerance:
-                        agreeing += weight
-            found[y - RADIUS, x - RADIUS] = agreeing / total
+        agreeing[:] = 0
+        total[:] = 0
+        own, own_gray = disparity[y, RADIUS:], gray[y, RADIUS:]
+        for row in range(y - SUPPORT_RADIUS, y + SUPPORT_RADIUS + 1, SUPPORT_STEP):
+            for first in range(RADIUS - SUPPORT_RADIUS, RADIUS + SUPPORT_RADIUS + 1, SUPPORT_STEP):
+                if row == y and first == RADIUS:
+                    continue  # the pixel itself: beside it the weights of unlike neighbours would be lost
+                other, other_gray = disparity[row, first:], gray[row, first:]
+                for x in range(width):  # an index that is never negative, and few arrays a loop, take vectors
+                    weight[x] = weights[np.uint32(abs(other_gray[x] - own_gray[x]))]
+                for x in range(width):
+                    total[x] += weight[x]
+                    agreeing[x] += weight[x] if abs(other[x] - own[x]) <= tolerance else np.float32(0)
+        for x in range(width):
+            found[y - RADIUS, x] = agreeing[x] / total[x]

@@ -68,8 +68,11 @@ def of_map(
 
 def compressed(features: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return features as a net takes them: ``sign(v) ln(1 + |v|)``; 0 where nothing is known."""
-    known = np.nan_to_num(features)
-    result: NDArray[np.float32] = np.sign(known) * np.log1p(np.abs(known))
+    size = np.abs(features)  # one array for all steps: the features of a tile do not fit the processor's cache
+    np.fmax(size, 0, out=size)  # NaN becomes 0
+    np.minimum(size, np.finfo(np.float32).max, out=size)
+    np.log1p(size, out=size)
+    result: NDArray[np.float32] = np.copysign(size, features, out=size)
     return result
 
 
