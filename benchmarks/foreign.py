@@ -22,6 +22,7 @@ from semidense.pipeline.plan.shipped_weights import read_network, shipped_weight
 from semidense.stages.catalog import STAGES
 from semidense.stages.compute.precision import resolve
 from semidense.stages.evaluation.declaration import RADIUS
+from semidense.stages.evaluation.evidence.declaration import REACH
 from semidense.stages.evaluation.evidence.foreign.confidence import compute_foreign_confidence
 from semidense.stages.evaluation.evidence.foreign.declaration import MATCHERS, ForeignConfidenceParams
 from semidense.stages.metrics.confidence import error_at_density
@@ -120,10 +121,10 @@ def _score(block: Mapping[str, Any], right: bool) -> Mapping[str, NDArray[np.flo
 
 def _block(images: Mapping[str, Array], disparity: Array, views: Array, nets: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the score is made from, as one tile with its context."""
-    around = (RADIUS, RADIUS)
+    around = (RADIUS + REACH, RADIUS + REACH)
     return {
         "images": {"left": np.pad(images["left"], (around, around, (0, 0)), mode="edge"), "moments": images["moments"]},
-        "disparity": {"disparity": np.pad(disparity, RADIUS, mode="edge")},
+        "disparity": {"disparity": np.pad(disparity, around, mode="edge")},
         "channels": {"channels": np.pad(views, ((0, 0), (0, 0), around, around), mode="edge")},
         **nets,
     }

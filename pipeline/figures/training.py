@@ -203,14 +203,15 @@ def trailing_mean(values: NDArray[np.float32], window: int) -> NDArray[np.float6
 
 def draw_foreign_samples(figure: Figure, dataset: xr.Dataset) -> None:
     """Draw how many pixels of each kind of map are learnt from, and how many of them are wrong."""
-    kind, wrong = dataset["kind"].values, dataset["error"].values > RIGHT
-    all_of = np.bincount(kind, minlength=len(KINDS))
-    wrong_of = np.bincount(kind[wrong], minlength=len(KINDS))
+    kind, error = dataset["kind"].values, dataset["error"].values.reshape(dataset.sizes["crop"], -1)
+    all_of = np.bincount(kind, np.isfinite(error).sum(axis=1), len(KINDS))
+    wrong_of = np.bincount(kind, (error > RIGHT).sum(axis=1), len(KINDS))
     axes = figure.add_subplot()
     places = range(len(KINDS))
     axes.barh(places, all_of, color=BLUE, label=f"right within {RIGHT:g} px")
     axes.barh(places, wrong_of, color=RED, label="wrong")
     axes.set_yticks(places, KINDS)
     axes.invert_yaxis()
-    axes.set(xlabel="samples", title=f"{kind.size:,} samples by kind of map, {100 * wrong.mean():.1f} % wrong")
+    share = 100 * wrong_of.sum() / all_of.sum()
+    axes.set(xlabel="pixels", title=f"{all_of.sum():,.0f} pixels by kind of map, {share:.1f} % wrong")
     axes.legend(fontsize="small")

@@ -17,7 +17,8 @@ from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 from torch import nn
 
-from semidense.stages.evaluation.evidence.foreign.net import ForeignNet
+from semidense.stages.evaluation.evidence.features import NAMES
+from semidense.stages.evaluation.evidence.foreign.declaration import FEATURES
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.parameters import count, from_vector, to_vector
@@ -45,9 +46,9 @@ def candidates(product: str) -> list[nn.Module]:
     if product == "descriptor_net":
         return [DescriptorNet(channels) for channels in range(1, MOST_CHANNELS + 1)]
     if product == "evidence_net":
-        return [EvidenceNet()]
+        return [EvidenceNet(len(NAMES))]
     if product == "foreign_net":
-        return [ForeignNet()]
+        return [EvidenceNet(len(FEATURES))]
     raise StageError(
         f"{product} is no network: weights are those of matching_net, descriptor_net, evaluation_net, evidence_net or "
         "foreign_net"

@@ -83,8 +83,8 @@ def evaluation_samples() -> xr.Dataset:
 def foreign_samples() -> xr.Dataset:
     return xr.Dataset(
         {
-            "kind": ("sample", np.repeat(np.arange(4, dtype=np.int8), 5)),
-            "error": ("sample", np.tile(np.float32([0, 0.5, 1, 2, 9]), 4)),
+            "kind": ("crop", np.repeat(np.arange(4, dtype=np.int8), 2)),
+            "error": (("crop", "row", "column"), np.tile(np.float32([[0, 0.5, np.nan], [1, 2, 9]]), (8, 1, 1))),
         }
     )
 

@@ -27,6 +27,7 @@ COMMANDS = (
     ("run", *ROBUST, "--output", "results"),
     ("run", "motorcycle", "--mode", "guided"),
     ("run", *ROBUST, *SURE),
+    ("inspect", "alignment", *ROBUST, "--png", "alignment.png"),
     ("inspect", "confidence", *ROBUST, "--png", "confidence.png"),
     ("inspect", "semidense", *ROBUST, *SURE, "--png", "disparity.png"),
     ("match", "photos/left.png", "photos/right.png", "-o", "matched"),
@@ -36,6 +37,7 @@ COMPARE = ("--preset", "robust", "--experiment", "density", "--without", "mc_cnn
 PICTURES = {
     "motorcycle-raw.png": "results/Motorcycle/disparity_raw-colour.png",
     "motorcycle-kept.png": "results/Motorcycle/disparity-colour.png",
+    "alignment.png": "alignment.png",
     "confidence.png": "confidence.png",
     "disparity.png": "disparity.png",
     "unrectified.png": "matched/survey.png",

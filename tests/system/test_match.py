@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+from skimage.data import stereo_motorcycle
 
 Invoke = Callable[..., Any]
 
@@ -30,6 +31,24 @@ def test_one_command_from_two_files_to_a_folder(invoke: Invoke, pair: Path, tmp_
     (about,) = json.loads(again.out)["pairs"]
     assert set(about["reused"]) >= {"images", "costvolume", "confidence"}
     assert 50 <= about["density_percent"] <= 100
+
+
+def test_a_right_view_that_lies_lower_is_matched_all_the_same(invoke: Invoke, tmp_path: Path) -> None:
+    """Motorcycle at half size, its right view 5 px lower: of the rows as they are, three quarters come out wrong."""
+    left, right, truth = stereo_motorcycle()
+    views = [np.asarray(Image.fromarray(view).resize((370, 250))) for view in (left, right)]
+    for name, view in zip(("left.png", "right.png"), (views[0], np.roll(views[1], 5, axis=0)), strict=True):
+        save(tmp_path / name, view)
+    arguments = ["match", tmp_path / "left.png", tmp_path / "right.png", "--min-disp", "0", "--max-disp", "40"]
+    ran = invoke(*arguments, "-o", tmp_path / "out", "--format", "npy", "--cache", tmp_path / "cache")
+    assert ran.code == 0, ran.err
+    assert "its rows were shifted, so the map may be right and the depth is not" in ran.err
+    assert "shifted the rows of the right view by +4.9 to +5.0 px" in ran.out
+    low, high = json.loads((tmp_path / "out" / "summary.json").read_text())["rows_shifted_px"]
+    assert 4.8 < low < high < 5.2
+    wrong = np.abs(np.load(tmp_path / "out" / "disparity_raw.npy") - truth[::2, ::2][:250, :370] / 2) > 1
+    known = np.isfinite(truth[::2, ::2][:250, :370])
+    assert wrong[known].mean() < 0.2
 
 
 @pytest.mark.parametrize(("variable", "drawn"), [("COLORTERM", True), ("NO_COLOR", False)])

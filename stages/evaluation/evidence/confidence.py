@@ -22,7 +22,7 @@ from semidense.stages.stage import Images
 @one_thread()
 def weigh(parameters: NDArray[np.float32], known: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the log-odds (y, x) that each disparity is right, of features (feature, y + 2 REACH, x)."""
-    net = EvidenceNet()
+    net = EvidenceNet(len(known))
     from_vector(net, parameters)
     with torch.inference_mode():
         odds: NDArray[np.float32] = net(torch.from_numpy(known)[None])[0].numpy()

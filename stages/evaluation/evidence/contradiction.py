@@ -12,11 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.stages.disparity.evidence import FEATURES
-from semidense.stages.evaluation.evidence.declaration import OF_MAP, OF_NEIGHBOURS, EvidenceSamples
+from semidense.stages.evaluation.evidence.declaration import EvidenceSamples
+from semidense.stages.evaluation.evidence.features import NAMES
 
-NAMES = (*OF_MAP, *FEATURES, *OF_NEIGHBOURS)
-"""The order of the feature axis."""
 SMALLEST = 8
 """Least side of a region, px."""
 FEW = 0.01

@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 from semidense.stages.compute.precision import Precision
 from semidense.stages.disparity.evidence import FEATURES
 from semidense.stages.evaluation.declaration import RADIUS
-from semidense.stages.evaluation.evidence.declaration import MEANS
+from semidense.stages.evaluation.evidence.declaration import MEANS, OF_MAP, OF_NEIGHBOURS
 from semidense.stages.evaluation.evidence.of_map import compressed, middle, of_map
 from semidense.stages.evaluation.evidence.windows import window_mean
 from semidense.stages.stage import Images, Network, StageError
+
+NAMES = (*OF_MAP, *FEATURES, *OF_NEIGHBOURS)
+"""The order of the feature axis."""
 
 
 def features(
@@ -27,8 +30,7 @@ def features(
         precision: arithmetic of the evaluation-Net.
 
     Returns:
-        (feature, y, x) float32: those of ``OF_MAP``, of ``stages.disparity.evidence.FEATURES`` and of
-        ``OF_NEIGHBOURS``, each as ``sign(v) ln(1 + |v|)``; 0 where nothing is known.
+        (feature, y, x) float32, in the order of ``NAMES``, each as ``sign(v) ln(1 + |v|)``; 0 where nothing is known.
 
     Raises:
         StageError: if the map brings no evidence of costs.

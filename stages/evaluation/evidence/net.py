@@ -4,12 +4,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from semidense.stages.disparity.evidence import FEATURES
-from semidense.stages.evaluation.evidence.declaration import DILATIONS, OF_MAP, OF_NEIGHBOURS, REACH
+from semidense.stages.evaluation.evidence.declaration import DILATIONS, REACH
 from semidense.stages.evaluation.evidence.standard import Standardised
 
-INPUTS = len(OF_MAP) + len(FEATURES) + len(OF_NEIGHBOURS)
-"""What a map by our own summed costs looks like, what the costs say of the pixel, and what they say in its windows."""
 HIDDEN = 32
 FARTHEST = 4.0
 """Deviations from the mean beyond which an input counts the same: what no training scene has, must not decide."""
@@ -20,11 +17,14 @@ class EvidenceNet(Standardised):
 
     One branch sees a pixel alone. The other one sees the map at half the size and looks at its surroundings with three
     3 x 3 kernels of growing dilation; each adds to what was there. Both are joined and give one number a pixel.
+
+    Args:
+        inputs: numbers that are known of a pixel.
     """
 
-    def __init__(self) -> None:
-        super().__init__(INPUTS)
-        self.first = nn.Conv2d(INPUTS, HIDDEN, 1)
+    def __init__(self, inputs: int) -> None:
+        super().__init__(inputs)
+        self.first = nn.Conv2d(inputs, HIDDEN, 1)
         self.around = nn.ModuleList(
             nn.Conv2d(HIDDEN, HIDDEN, 3, dilation=apart, padding=(0, apart)) for apart in DILATIONS
         )

@@ -6,7 +6,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
-from torch.nn import functional
 
 from semidense.stages.evaluation.evidence.contradiction import contradict, donors_of
 from semidense.stages.evaluation.evidence.declaration import (
@@ -15,6 +14,8 @@ from semidense.stages.evaluation.evidence.declaration import (
     EvidenceSamples,
     OfEvidenceSamples,
 )
+from semidense.stages.evaluation.evidence.features import NAMES
+from semidense.stages.evaluation.evidence.loss import crop_loss
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.samples import UNKNOWN
 from semidense.stages.learning.parameters import initialise, to_vector
@@ -23,8 +24,6 @@ from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import fit
 from semidense.stages.stage import Monitor, Network, Silent, by_scene
 
-LEAST = 500
-"""Pixels that a crop counts as at least: a few judged ones do not weigh as much as a whole crop."""
 SEEN = 4000
 """Judged pixels of each scene by which the inputs are measured and bad evidence is found."""
 
@@ -49,7 +48,7 @@ def train_evidence_net(params: EvidenceNetParams, inputs: OfEvidenceSamples, mon
     seen = [scenes[number].pixels(drawn) for number in range(len(scenes))]
     features, right = (np.concatenate(each) for each in zip(*seen, strict=True))
     donors = donors_of(features, right)
-    net = EvidenceNet()
+    net = EvidenceNet(len(NAMES))
     initialise(net, params.seed)
     net.keep(torch.from_numpy(features.mean(axis=0)), torch.from_numpy(features.std(axis=0)))
 
@@ -58,19 +57,11 @@ def train_evidence_net(params: EvidenceNetParams, inputs: OfEvidenceSamples, mon
         losses = []
         for _ in range(params.batch // SHARDS):
             crop = scenes[int(rng.integers(len(scenes)))].crop((params.height, params.width), rng)
-            losses.append(_loss(net, contradict(crop, donors, params.contradicted, rng)))
+            losses.append(crop_loss(net, contradict(crop, donors, params.contradicted, rng)))
         return torch.stack(losses).mean()
 
     curve = fit(net, loss, params, monitor or Silent())
     return {"parameters": to_vector(net), "loss": curve}
-
-
-def _loss(net: EvidenceNet, crop: EvidenceSamples) -> Tensor:
-    labels = torch.from_numpy(crop["right"])
-    judged = labels != UNKNOWN
-    odds = net(torch.from_numpy(crop["features"])[None])[0][judged]
-    total = functional.binary_cross_entropy_with_logits(odds, (labels[judged] == 1).float(), reduction="sum")
-    return total / max(len(odds), LEAST)
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,7 @@ def test_every_product_of_the_pipeline_has_a_figure() -> None:
         ),
         pytest.param(
             "foreign_samples",
-            ["20 samples by kind of map, 40.0 % wrong", "sgm, dense", "summed costs, blurred", "right within 1 px"],
+            ["40 pixels by kind of map, 40.0 % wrong", "sgm, dense", "summed costs, blurred", "right within 1 px"],
             id="kinds-of-maps",
         ),
         pytest.param(

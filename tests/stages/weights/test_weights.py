@@ -10,7 +10,8 @@ from safetensors import safe_open
 from safetensors.torch import load, save
 
 from semidense.stages import weights
-from semidense.stages.evaluation.evidence.foreign.net import ForeignNet
+from semidense.stages.evaluation.evidence.features import NAMES
+from semidense.stages.evaluation.evidence.foreign.declaration import FEATURES
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.parameters import count, to_vector
@@ -58,13 +59,13 @@ def test_the_round_trip_of_an_evaluation_net_is_exact() -> None:
 
 
 def test_the_round_trip_of_an_evidence_net_is_exact() -> None:
-    vector = np.random.default_rng(0).normal(size=count(EvidenceNet())).astype(np.float32)
+    vector = np.random.default_rng(0).normal(size=count(EvidenceNet(len(NAMES)))).astype(np.float32)
     data = save_weights("evidence_net", {"parameters": vector, "loss": LOSS}, {})
     assert np.array_equal(read_weights("evidence_net", data)["parameters"], vector)
 
 
 def test_the_round_trip_of_a_foreign_net_is_exact() -> None:
-    vector = np.random.default_rng(0).normal(size=count(ForeignNet())).astype(np.float32)
+    vector = np.random.default_rng(0).normal(size=count(EvidenceNet(len(FEATURES)))).astype(np.float32)
     data = save_weights("foreign_net", {"parameters": vector, "loss": LOSS}, {})
     assert np.array_equal(read_weights("foreign_net", data)["parameters"], vector)
 

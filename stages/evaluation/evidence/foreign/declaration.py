@@ -9,7 +9,7 @@ from pydantic import Field
 
 from semidense.stages.compute.precision import Precision
 from semidense.stages.evaluation.declaration import RADIUS
-from semidense.stages.evaluation.evidence.declaration import MEANS, OF_MAP
+from semidense.stages.evaluation.evidence.declaration import MEANS, OF_MAP, REACH
 from semidense.stages.learning.schedule import SHARDS, Schedule
 from semidense.stages.stage import DisparityMap, Images, Network, Output, Params, Stage, Truth
 from semidense.stages.transforms.declaration import Channels
@@ -52,9 +52,11 @@ FEATURES = (*OF_MAP, *OF_CELLS)
 
 
 class ForeignSamplesParams(Params):
-    """Which pixels of which maps the net learns from."""
+    """Which crops of each map the net learns from."""
 
-    pixels: int = Field(2000, ge=1, description="pixels of each map, drawn at random")
+    crops: int = Field(4, ge=1, description="crops of each map, around random pixels that have a disparity and a truth")
+    height: int = Field(96, ge=2, multiple_of=2, description="rows of a crop that are judged, px")
+    width: int = Field(96, ge=2, description="columns of a crop, px")
     precision: Precision = Field(
         "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
     )
@@ -64,12 +66,10 @@ class ForeignSamplesParams(Params):
 class ForeignNetParams(Schedule):
     """How the net that scores foreign maps learns."""
 
-    steps: int = Field(1500, ge=1, description="optimiser steps")
+    steps: int = Field(2000, ge=1, description="optimiser steps")
     optimiser: Literal["muon", "adam"] = Field("adam", description="what makes a step of a large kernel's gradient")
-    peak_rate: float = Field(0.01, gt=0, description="highest learning rate")
-    checkpoint_steps: int = Field(500, ge=1, description="steps between two checkpoints", exclude=True)
-    batch: int = Field(1024, ge=SHARDS, multiple_of=SHARDS, description="pixels a step; a multiple of the shards")
-    blind: float = Field(0.5, ge=0, le=1, description="share of the pixels that are seen without a right view")
+    batch: int = Field(8, ge=SHARDS, multiple_of=SHARDS, description="crops a step; a multiple of the shards")
+    blind: float = Field(0.5, ge=0, le=1, description="share of the crops that are seen without a right view")
     tolerance: float = Field(1.0, gt=0, description="largest error of a disparity that counts as right, px")
     seed: int = Field(0, ge=0, description="seed of the weights and of the draw")
 
@@ -92,9 +92,13 @@ class ForeignConfidenceParams(Params):
 
 
 class ForeignSamples(TypedDict):
-    """The product ``foreign_samples``: (sample, feature) what is known; (sample,) error and kind of map."""
+    """The product ``foreign_samples``: crops of the maps of a scene.
 
-    features: NDArray[np.float32]
+    ``features`` (crop, feature, seen, column) has ``REACH`` more rows than ``error`` (crop, row, column) above and
+    below; ``kind`` (crop,) is the map's.
+    """
+
+    features: NDArray[np.floating]
     error: NDArray[np.float32]
     kind: NDArray[np.int8]
 
@@ -135,14 +139,14 @@ FOREIGN_SAMPLES = Stage(
     product="foreign_samples",
     inputs=("images", "truth", "channels", *MATCHERS, "aggregated", "evaluation_net", "descriptor_net"),
     outputs=(
-        Output("features", ("sample", "feature"), "float32", "1", "what is known of each pixel"),
-        Output("error", ("sample",), "float32", "px", "difference of its disparity to the truth; infinite: none"),
-        Output("kind", ("sample",), "int8", "1", "kind of its map: index into " + "; ".join(KINDS)),
+        Output("features", ("crop", "feature", "seen", "column"), "float16", "1", "what is known: sign(v) ln(1 + |v|)"),
+        Output("error", ("crop", "row", "column"), "float32", "px", "difference to the truth; NaN: unknown"),
+        Output("kind", ("crop",), "int8", "1", "kind of its map: index into " + "; ".join(KINDS)),
     ),
     compute="semidense.stages.evaluation.evidence.foreign.samples:draw_foreign_samples",
     params=ForeignSamplesParams,
 )
-"""Pixels of the maps of several matchers, checked, filled, smoothed: what is learnt from. One a scene, so that a
+"""Crops of the maps of several matchers, checked, filled, smoothed: what is learnt from. One a scene, so that a
 training that was stopped goes on with the scenes that are left."""
 
 FOREIGN_NET = Stage(
@@ -170,7 +174,7 @@ FOREIGN_CONFIDENCE = Stage(
     compute="semidense.stages.evaluation.evidence.foreign.confidence:compute_foreign_confidence",
     params=ForeignConfidenceParams,
     tile_rows=256,
-    halo=lambda _: RADIUS,
+    halo=lambda _: RADIUS + REACH,
     border="edge",
     one_view=True,
 )

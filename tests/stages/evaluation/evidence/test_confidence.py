@@ -15,9 +15,9 @@ from semidense.stages.evaluation.evidence.declaration import (
     REACH,
     EvidenceConfidenceParams,
 )
-from semidense.stages.evaluation.evidence.features import of_whole_map
+from semidense.stages.evaluation.evidence.features import NAMES, of_whole_map
 from semidense.stages.evaluation.evidence.foreign.declaration import FOREIGN_CONFIDENCE
-from semidense.stages.evaluation.evidence.net import INPUTS, EvidenceNet
+from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.evidence.of_map import STEP, opened
 from semidense.stages.evaluation.layers import evaluation_layers
 from semidense.stages.learning.parameters import initialise, to_vector
@@ -38,7 +38,7 @@ PARAMS = EvidenceConfidenceParams(precision="float32")
 
 
 def evidence_net() -> np.ndarray:
-    net = EvidenceNet()
+    net = EvidenceNet(len(NAMES))
     initialise(net, 1)
     return to_vector(net)
 
@@ -61,7 +61,7 @@ def products(height: int = 11, width: int = 8) -> dict[str, dict[str, np.ndarray
 def test_the_features_are_what_they_are_called() -> None:
     given = products()
     known = of_whole_map(given["images"], given["disparity"], given["evaluation_net"], "float32")
-    assert known.shape == (INPUTS, 11, 8) and np.isfinite(known).all()
+    assert known.shape == (len(NAMES), 11, 8) and np.isfinite(known).all()
     told = dict(zip((*OF_MAP, *FEATURES, *OF_NEIGHBOURS), opened(known), strict=True))
     evidence, disparity = given["disparity"]["evidence"].astype(np.float32), given["disparity"]["disparity"]
     for name, values in zip(FEATURES, np.nan_to_num(evidence), strict=True):

@@ -10,8 +10,8 @@ from semidense.stages.evaluation.evidence.declaration import (
     EvidenceNetParams,
     EvidenceSamplesParams,
 )
-from semidense.stages.evaluation.evidence.features import of_whole_map
-from semidense.stages.evaluation.evidence.net import INPUTS, EvidenceNet
+from semidense.stages.evaluation.evidence.features import NAMES, of_whole_map
+from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.evidence.samples import compute_evidence_samples
 from semidense.stages.evaluation.evidence.train import train_evidence_net
 from semidense.stages.learning.parameters import initialise
@@ -66,9 +66,9 @@ def test_a_training_that_was_killed_ends_as_an_undisturbed_one() -> None:
 
 
 def test_a_number_that_never_varied_in_training_does_not_count_later() -> None:
-    net, rng = EvidenceNet(), np.random.default_rng(0)
+    net, rng = EvidenceNet(len(NAMES)), np.random.default_rng(0)
     initialise(net, 0)
-    known = torch.from_numpy(rng.normal(size=(1, INPUTS, 4 + 2 * REACH, 5)).astype(np.float32))
+    known = torch.from_numpy(rng.normal(size=(1, len(NAMES), 4 + 2 * REACH, 5)).astype(np.float32))
     mean, deviation = known.mean(dim=(0, 2, 3)), known.std(dim=(0, 2, 3))
     deviation[1] = 0
     net.keep(mean, deviation)
@@ -81,9 +81,9 @@ def test_a_number_that_never_varied_in_training_does_not_count_later() -> None:
 
 
 def test_a_pixel_depends_on_no_row_beyond_the_reach() -> None:
-    net, rng = EvidenceNet(), np.random.default_rng(0)
+    net, rng = EvidenceNet(len(NAMES)), np.random.default_rng(0)
     initialise(net, 0)
-    known = torch.from_numpy(rng.normal(size=(1, INPUTS, 40 + 2 * REACH, 7)).astype(np.float32))
+    known = torch.from_numpy(rng.normal(size=(1, len(NAMES), 40 + 2 * REACH, 7)).astype(np.float32))
     other = known.clone()
     other[:, :, : REACH + 2] += 1
     with torch.inference_mode():

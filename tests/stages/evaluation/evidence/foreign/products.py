@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from semidense.stages.evaluation.evidence.foreign.net import ForeignNet
+from semidense.stages.evaluation.evidence.foreign.declaration import FEATURES
+from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.learning.parameters import initialise, to_vector
 from tests.stages.evaluation.reference import random_net, scene
 from tests.stages.matching.descriptors.test_volume import random_descriptor_net
@@ -18,7 +19,7 @@ DIMS = {
 
 
 def foreign_net() -> np.ndarray:
-    net = ForeignNet()
+    net = EvidenceNet(len(FEATURES))
     initialise(net, 1)
     return to_vector(net)
 
