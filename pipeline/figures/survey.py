@@ -36,7 +36,7 @@ def draw_alignment(figure: Figure, dataset: xr.Dataset) -> None:
     offset = dataset["rows"].values[:, None] + dataset["columns"].values
     y, x, measured = dataset["offsets"].values.T
     (axes,) = image_panels(figure, offset.shape, columns=1)[0]
-    low, high = _span(np.append(measured, [offset.min(), offset.max()]), centred=True, least=_LEAST_SHIFT)
+    low, high = _span(np.append(measured, [offset.min(), offset.max()]), centred=True, least=_LEAST_SHIFT, tail=5)
     axes.imshow(offset, cmap=cost_colours(), vmin=low, vmax=high)
     dots = axes.scatter(x, y, c=measured, s=8, cmap=cost_colours(), vmin=low, vmax=high, edgecolors="black", lw=0.2)
     label = "vertical offset, right minus left (px)"
@@ -62,8 +62,10 @@ def _draw_matches(
     axes.figure.colorbar(dots, cax=axes.inset_axes((1.02, 0, 0.035, 1)), label=label)
 
 
-def _span(values: NDArray[np.float32], centred: bool, least: float = _LEAST_SPAN) -> tuple[float, float]:
-    """Return the values of the first and last colour; 1 % at each end may lie beyond."""
-    low, high = np.percentile(values, (1, 99)) if values.size else (0.0, 1.0)
+def _span(
+    values: NDArray[np.float32], centred: bool, least: float = _LEAST_SPAN, tail: float = 1
+) -> tuple[float, float]:
+    """Return the values of the first and last colour; ``tail`` % at each end may lie beyond."""
+    low, high = np.percentile(values, (tail, 100 - tail)) if values.size else (0.0, 1.0)
     reach = max(least, abs(low), abs(high))
     return (-reach, reach) if centred else (float(low), float(high))

@@ -23,11 +23,13 @@ from tests.system.conftest import chromium, serving
 
 ROBUST = ("motorcycle", "--preset", "robust")
 SURE = ("--set", "semidense.density=0.6")
+TURNED = "pair:photos/left.png,photos/turned.png"
 COMMANDS = (
     ("run", *ROBUST, "--output", "results"),
     ("run", "motorcycle", "--mode", "guided"),
     ("run", *ROBUST, *SURE),
-    ("inspect", "alignment", *ROBUST, "--png", "alignment.png"),
+    ("run", TURNED, "--preset", "robust", "--upto", "alignment"),
+    ("inspect", "alignment", TURNED, "--preset", "robust", "--png", "alignment.png"),
     ("inspect", "confidence", *ROBUST, "--png", "confidence.png"),
     ("inspect", "semidense", *ROBUST, *SURE, "--png", "disparity.png"),
     ("match", "photos/left.png", "photos/right.png", "-o", "matched"),
@@ -78,12 +80,13 @@ def main(
 
 
 def write_unrectified(folder: Path) -> None:
-    """Write the Motorcycle pair at half size, the right view 5 px too low, as ``left.png`` and ``right.png``."""
+    """Write the Motorcycle pair at half size, its right view 5 px too low, and another one turned by 0.2 degrees."""
     folder.mkdir()
     left, right, _ = stereo_motorcycle()
     half = [np.asarray(Image.fromarray(view).resize((370, 250))) for view in (left, right)]
     Image.fromarray(half[0]).save(folder / "left.png")
     Image.fromarray(np.roll(half[1], 5, axis=0)).save(folder / "right.png")
+    Image.fromarray(half[1]).rotate(0.2, Image.Resampling.BICUBIC).save(folder / "turned.png")
 
 
 def save_small(source: Path, target: Path) -> None:
