@@ -34,9 +34,11 @@ Crops = Mapping[str, NDArray[Any]]
 def main(
     dataset: Annotated[str, typer.Argument(help="the training scenes, such as middlebury:DIR")],
     cache: Annotated[Path | None, typer.Option(help="the cache's folder; default: the user's")] = None,
+    setting: Annotated[list[str] | None, typer.Option("--set", help="section.field=value")] = None,
 ) -> None:
     """Print and write the figures of each kind, and their mean."""
-    task = Task(dataset, cache=cache, settings=["costvolume.mode=fast", SHIPPED], train=True)
+    task = Task(dataset, cache=cache, settings=["costvolume.mode=fast", SHIPPED, *(setting or ())], train=True)
+    params = task.configuration().of("foreign_net", ForeignNetParams)
     made = run(task, "foreign_net")
     keys = {each.step.scene: each.key for each in made.made.values() if each.step.product == "foreign_samples"}
     scenes = {name: {k: v[...] for k, v in made.store.arrays(key).items()} for name, key in sorted(keys.items())}
@@ -44,9 +46,9 @@ def main(
     figures: dict[str, list[list[float]]] = {kind: [] for kind in KINDS}
     for part in range(PARTS):
         learnt = [crops for name, crops in scenes.items() if parts[name] != part]
-        parameters = train_foreign_net(ForeignNetParams(), {"foreign_samples": learnt})["parameters"]  # type: ignore[typeddict-item]
+        parameters = train_foreign_net(params, {"foreign_samples": learnt})["parameters"]  # type: ignore[typeddict-item]
         for name in (name for name in scenes if parts[name] == part):
-            for kind, row in zip(KINDS, _figures(scenes[name], parameters), strict=True):
+            for kind, row in zip(KINDS, _figures(scenes[name], parameters, params.tolerance), strict=True):
                 figures[kind].append(row)
     means = {kind: np.mean(rows, axis=0).tolist() for kind, rows in figures.items()}
     means["mean"] = np.mean(list(means.values()), axis=0).tolist()
@@ -56,13 +58,13 @@ def main(
         print(f"{kind:34}" + "".join(f"{value:10.4f}" for value in row))
 
 
-def _figures(crops: Crops, parameters: NDArray[np.float32]) -> Iterator[list[float]]:
+def _figures(crops: Crops, parameters: NDArray[np.float32], tolerance: float) -> Iterator[list[float]]:
     """Yield the figures of each kind of map of a scene, in the order of ``COLUMNS``."""
     for kind in range(len(KINDS)):
         chosen = crops["kind"] == kind
         known, error = crops["features"][chosen].astype(np.float32), crops["error"][chosen]
         judged = np.isfinite(error)
-        right = error[judged] <= ForeignNetParams().tolerance
+        right = error[judged] <= tolerance
         alone = known.copy()
         alone[:, -len(OF_CELLS) :] = 0
         net = known[:, NETWORK, REACH:-REACH]

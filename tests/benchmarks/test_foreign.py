@@ -1,14 +1,18 @@
 """The table of other matchers' maps, and the maps that Pandora's environment gives it."""
 
+import json
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks import foreign, pandora
+from benchmarks import foreign, kinds, pandora
 from benchmarks.peers import PeerError
 from semidense.datasets import open_dataset
+from semidense.stages.evaluation.evidence.foreign.declaration import KINDS, ForeignNetParams, OfForeignSamples
+from semidense.stages.evaluation.evidence.foreign.train import train_foreign_net
+from semidense.stages.stage import Network
 
 TINY = "synthetic:train=0,test=1,height=48,width=64,disparities=4"
 STAND_IN = """
@@ -60,3 +64,26 @@ def test_a_pandora_that_does_not_run_is_one_line(tmp_path: Path, monkeypatch: py
     (scene,) = open_dataset(TINY).scenes
     with pytest.raises(PeerError, match=r"Pandora fails on .*no plugin$"):
         pandora.match(Path(sys.executable), scene, "census", tmp_path / "work")
+
+
+def test_each_kind_of_map_is_scored_by_a_net_of_other_scenes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("cv2", reason="needs the extra baselines")
+    monkeypatch.chdir(tmp_path)
+    learnt: list[int] = []
+
+    def train(params: ForeignNetParams, inputs: OfForeignSamples) -> Network:
+        learnt.append(len(inputs["foreign_samples"]))
+        return train_foreign_net(params, inputs)
+
+    monkeypatch.setattr(kinds, "train_foreign_net", train)
+    settings = ["foreign_net.steps=2", "foreign_samples.crops=1", "foreign_samples.height=32"]
+    kinds.main("synthetic:train=3,test=0,height=48,width=64,disparities=4", tmp_path / "cache", settings)
+    assert learnt == [2, 2, 2]
+    printed = capsys.readouterr().out
+    assert all(kind in printed for kind in KINDS)
+    found = json.loads((tmp_path / "build" / "bench" / "kinds.json").read_text())
+    assert len(found["scenes"]) == 3 and list(found["means"]) == [*KINDS, "mean"]
+    for wrong, *areas, perfect in found["means"].values():
+        assert 0 <= wrong <= 100 and all(perfect - 1e-9 <= area <= 1 for area in areas)
