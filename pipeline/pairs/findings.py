@@ -75,7 +75,7 @@ def _exchanged(disparity: Array, step: float, searched: DisparityRange | None, d
 def _unrectified(vertical: Array, step: float, aligned: bool) -> Iterator[str]:
     low, middle, high = np.percentile(vertical, (_TAIL, 50, 100 - _TAIL))
     if abs(middle) >= max(_LEAST_OFFSET, step / 2) or high - low >= max(2 * _LEAST_OFFSET, 2 * step):
-        shifted = "; its rows were shifted, so the map may be right and the depth is not" if aligned else ""
+        shifted = "; its rows were shifted, so the map can be right, but its depth may be wrong" if aligned else ""
         yield (
             f"the pair looks unrectified: the right view lies {middle:+.0f} px ({low:+.0f} to {high:+.0f}, measured to "
             f"{step:g} px) below the left one, where it should lie level{shifted}; rectify it first with "
