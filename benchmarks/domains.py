@@ -1,18 +1,19 @@
 """How maps and confidence do in several worlds beside SGBM: ``python -m benchmarks.domains DATASET ...``.
 
-Each scene is matched by a preset with the package's weights, and by OpenCV's SGBM. The tables have the mean over the
-scenes of each data set: what is wrong in the dense map, at SGBM's density and at R = 0.9; what comes of a wanted error,
-which counts a disparity as right within 1, 2 or 3 px (the calibration has a table for each).
-Pixels that both views see count, a pixel without a disparity is wrong in a dense map. Where SGBM keeps more pixels than
-have a confidence above 0, the rest is filled up at random. The expected calibration error (ECE) is of the pixels with a
-confidence above 0: a veto sets pixels to 0 to keep them out, which is no probability. A data set in another layout is
-described by a small file (``toml:FILE``).
+Each scene is matched by a preset with the package's weights, and by OpenCV's SGBM; ``--pandora MAPS`` adds the maps
+that ``python -m benchmarks.pandora`` wrote. The tables have the mean over the scenes of each data set: what is wrong in
+the dense map, at the density of the others and at R = 0.9; what comes of a wanted error, which counts a disparity as
+right within 1, 2 or 3 px (the calibration has a table for each).
+Pixels that both views see count, a pixel without a disparity is wrong in a dense map. Where another matcher keeps more
+pixels than have a confidence above 0, the rest is filled up at random. The expected calibration error (ECE) is of the
+pixels with a confidence above 0: a veto sets pixels to 0 to keep them out, which is no probability. A data set in
+another layout is described by a small file (``toml:FILE``).
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import typer
@@ -21,7 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.harness import write
-from semidense.datasets import open_dataset
+from semidense.datasets import open_dataset, read_pfm
 from semidense.pipeline.api import Task, carry_out
 from semidense.pipeline.execution.progress import ProgressWatch
 from semidense.pipeline.execution.watch import Watch
@@ -43,21 +44,25 @@ def main(
     dataset: Annotated[list[str], typer.Argument(help="such as kitti2015:DIR, eth3d:DIR, toml:FILE")],
     preset: Annotated[str, typer.Option(help="named settings")] = "robust",
     setting: Annotated[list[str] | None, typer.Option("--set", help="section.field=value")] = None,
+    pandora: Annotated[Path | None, typer.Option(help="folder of Pandora's maps, of all data sets")] = None,
     cache: Annotated[Path | None, typer.Option(help="the cache's folder; default: the user's")] = None,
 ) -> None:
     """Print and write the figures of each data set."""
-    found = {spec: _figures(Task(spec, settings=setting or (), preset=preset, cache=cache)) for spec in dataset}
+    tasks = [Task(spec, settings=setting or (), preset=preset, cache=cache) for spec in dataset]
+    found = {str(task.dataset): _figures(task, pandora) for task in tasks}
     write("domains", {"preset": preset, "settings": setting or [], "datasets": found})
-    _print(
-        "% wrong: dense, at SGBM's density, R = 0.9", found, [f"{name}>{t:g}" for t in TOLERANCES for name in _SHARES]
-    )
+    others = ["SGBM"] if pandora is None else ["SGBM", "Pandora"]
+    shares = ["dense", *(name.format(other) for other in others for name in _OF_OTHER), "R = 0.9"]
+    _print("% wrong", found, [f"{name} >{limit:g}" for limit in TOLERANCES for name in shares])
     errors = [f"{name} > {limit:g} px" for name in _ECE for limit in TOLERANCES]
-    _print("what is kept, and the order", found, ["scenes", "kept, SGBM", "kept, R = 0.9", "AUC", *errors])
+    kept = [f"kept, {name}" for name in (*others, "R = 0.9")]
+    _print("what is kept, and the order", found, ["scenes", *kept, "AUC", *errors])
     _print("a wanted error: % wrong of % kept", found, [f"{w:g} {what}" for w in WISHES for what in _KEPT])
 
 
 _ECE = ("ECE", "ECE a scene", "ECE with vetoed")
-_SHARES = ("dense ", "SGBM dense ", "at its density ", "SGBM ", "R = 0.9 ")
+_OF_OTHER = ("{} dense", "at {}'s density", "{}")
+"""Wrong in another matcher's dense map, in ours at the density of its checked one, and in the checked one."""
 _KEPT = tuple(f"{what} {limit:g} px" for limit in TOLERANCES for what in ("kept, within", "wrong, >"))
 
 
@@ -68,7 +73,7 @@ def _print(title: str, found: Mapping[str, Figures], names: Sequence[str]) -> No
     Console(width=160).print(table)
 
 
-def _figures(task: Task) -> Figures:
+def _figures(task: Task, pandora: Path | None) -> Figures:
     """Return the mean of each figure over the scenes with a truth, and the calibration error of all their pixels."""
     scenes = [scene for scene in open_dataset(str(task.dataset)).scenes if scene.has_truth]
     chosen = open_dataset(str(task.dataset)).select([scene.name for scene in scenes])
@@ -80,11 +85,18 @@ def _figures(task: Task) -> Figures:
 
     with ProgressWatch() as watch:
         results = {tolerance: made(tolerance, watch) for tolerance in TOLERANCES}
-    maps = [_Maps.of(results, scene.name) for scene in scenes]
+    maps = [_Maps.of(results, scene.name, pandora) for scene in scenes]
     rows = [_of_scene(each) for each in maps]
     means = {name: float(np.nanmean([row[name] for row in rows])) for name in rows[0]}
     errors = {name: value for limit in TOLERANCES for name, value in _calibration_errors(maps, limit).items()}
     return means | errors | {"scenes": len(rows)}
+
+
+class _Other(NamedTuple):
+    """Another matcher's map, (y, x) disparities in px, before and after its checks."""
+
+    dense: Values
+    checked: Values
 
 
 @dataclass(frozen=True)
@@ -97,29 +109,30 @@ class _Maps:
     truth: Values
     mask: Flags
     own: Values
-    sgm: Values
-    sgm_dense: Values
+    others: Mapping[str, _Other]
     score: Values
     chance: Mapping[float, Values]
 
     @classmethod
-    def of(cls, results: Mapping[float, Result], scene: str) -> "_Maps":
+    def of(cls, results: Mapping[float, Result], scene: str, pandora: Path | None) -> "_Maps":
         result = results[TOLERANCES[0]]
         truth, sgm = result.open("truth", scene), result.open("sgm", scene)
+        others = {"SGBM": _Other(sgm["dense"].values, sgm["disparity"].values)}
+        if pandora is not None:
+            name = scene.rsplit("/", 1)[-1]
+            others["Pandora"] = _Other(read_pfm(pandora / f"{name}.pfm"), read_pfm(pandora / f"{name}.checked.pfm"))
         return cls(
             truth["disparity"].values,
             truth["nonocc"].values & np.isfinite(truth["disparity"].values),
             result.open("disparity", scene)["disparity"].values,
-            sgm["disparity"].values,
-            sgm["dense"].values,
+            others,
             result.open("confidence", scene)["confidence"].values,
             {limit: of.open("calibrated_confidence", scene)["confidence"].values for limit, of in results.items()},
         )
 
-    @property
-    def sgm_share(self) -> float:
-        """The share of the pixels that SGBM keeps."""
-        return float(np.isfinite(self.sgm)[self.mask].mean())
+    def kept_by(self, other: _Other) -> float:
+        """Return the share of the pixels that another matcher keeps."""
+        return float(np.isfinite(other.checked)[self.mask].mean())
 
     def right(self, disparity: Values, limit: float) -> Flags:
         """Return where a map is right."""
@@ -145,7 +158,7 @@ def _of_scene(maps: _Maps) -> Figures:
     kept, ranking = maps.score >= np.float32(0.9), Ranking.of(maps.score[maps.mask])
     right = maps.right(maps.own, 1)[maps.mask]
     return {
-        "kept, SGBM": 100 * maps.sgm_share,
+        **{f"kept, {name}": 100 * maps.kept_by(other) for name, other in maps.others.items()},
         "kept, R = 0.9": 100 * float(kept[maps.mask].mean()),
         "AUC": ranking.auc(right),
         **{name: value for limit in TOLERANCES for name, value in _shares(maps, kept, ranking, limit).items()},
@@ -167,15 +180,18 @@ def _error(gaps: NDArray[np.float64]) -> float:
 
 
 def _shares(maps: _Maps, kept: Flags, ranking: Ranking, limit: float) -> Figures:
-    count = max(1, round(maps.sgm_share * np.count_nonzero(maps.mask)))
-    values = (
-        maps.wrong(maps.own, limit),
-        maps.wrong(maps.sgm_dense, limit),
-        100 * float(ranking.wrong(maps.right(maps.own, limit)[maps.mask])[count - 1]) / count,
-        maps.wrong(maps.sgm, limit, np.isfinite(maps.sgm)),
-        maps.wrong(maps.own, limit, kept),
-    )
-    return {f"{name}>{limit:g}": value for name, value in zip(_SHARES, values, strict=True)}
+    shares = {"dense": maps.wrong(maps.own, limit)}
+    order = ranking.wrong(maps.right(maps.own, limit)[maps.mask])
+    for name, other in maps.others.items():
+        count = max(1, round(maps.kept_by(other) * np.count_nonzero(maps.mask)))
+        values = (
+            maps.wrong(other.dense, limit),
+            100 * float(order[count - 1]) / count,
+            maps.wrong(other.checked, limit, np.isfinite(other.checked)),
+        )
+        shares |= {what.format(name): value for what, value in zip(_OF_OTHER, values, strict=True)}
+    shares["R = 0.9"] = maps.wrong(maps.own, limit, kept)
+    return {f"{name} >{limit:g}": value for name, value in shares.items()}
 
 
 def _promised(maps: _Maps, wish: float) -> Figures:

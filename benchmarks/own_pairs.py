@@ -1,10 +1,17 @@
 """The time that `match` takes for a new pair and for each further one: ``python -m benchmarks.own_pairs``.
 
 A command matches one pair of 741 x 500 px and 71 disparities, another one the same and two more, each in an empty
-cache, files and pictures included. The difference is what two further pairs take: in processor time, which other work
-on the machine changes little. Loops are compiled beforehand.
+cache, files and pictures included. Loops are compiled beforehand.
+
+- The first command stands against Pandora's on the same pair: MC-CNN fast, libSGM, V-fit, median, cross-checking.
+  Pandora is installed into an environment of its own, once.
+- The difference of the two commands is what two further pairs take: in processor time, which other work on the machine
+  changes little, and by the clock, against OpenCV's SGBM on one thread.
+
+All are timed in turn.
 """
 
+import json
 import os
 import subprocess
 import sys
@@ -21,11 +28,31 @@ from PIL import Image
 from skimage.data import stereo_motorcycle
 
 from benchmarks.cached_run import ENTRY
-from benchmarks.harness import Ratio, report
+from benchmarks.harness import FOLDER, Ratio, report, timed
+from benchmarks.pandora import environment
+from benchmarks.peers import PeerError
+from semidense.stages.baselines.declaration import SgmParams
+from semidense.stages.baselines.sgm import match_semi_global
+from semidense.stages.transforms.gray import to_gray
 
 View = NDArray[np.uint8]
+LAST = 70
+"""Largest disparity that is searched, px; the smallest is 0."""
 FURTHER = 2
-TARGET = 4.0
+OF_PANDORA = 0.5
+PROCESSOR = 4.0
+"""Processor seconds of a further pair: 2 s on two cores."""
+TIMES_SGBM = 12.0
+"""2 s, where SGBM takes 0.17 s."""
+_STEPS = {
+    "matching_cost": {"matching_cost_method": "mc_cnn"},
+    "optimization": {"optimization_method": "sgm"},
+    "disparity": {"disparity_method": "wta", "invalid_disparity": "NaN"},
+    "refinement": {"refinement_method": "vfit"},
+    "filter": {"filter_method": "median"},
+    "validation": {"validation_method": "cross_checking_accurate"},
+}
+"""Pandora's pipeline."""
 
 
 def write_pairs(folder: Path, shrink: int) -> None:
@@ -42,7 +69,7 @@ def seconds_of(folder: Path, scenes: str) -> tuple[float, float]:
     """Return the wall time and the processor time of a command that matches pairs of a folder, named by a letter."""
     with tempfile.TemporaryDirectory() as scratch:
         sides = [str(folder / side) for side in ("left", "right")]
-        options = ["--min-disp", "0", "--max-disp", "70", "--cache", f"{scratch}/cache", "-o", f"{scratch}/out"]
+        options = ["--min-disp", "0", "--max-disp", str(LAST), "--cache", f"{scratch}/cache", "-o", f"{scratch}/out"]
         chosen = [option for scene in scenes for option in ("--scene", scene)]
         begun, before = time.perf_counter(), os.times()
         subprocess.run(
@@ -53,19 +80,75 @@ def seconds_of(folder: Path, scenes: str) -> tuple[float, float]:
         return time.perf_counter() - begun, used
 
 
+def seconds_of_sgbm(folder: Path) -> float:
+    """Return the wall time of OpenCV's SGBM on the first pair, eight paths, one thread."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    left, right = (to_gray(np.asarray(Image.open(folder / side / "a.png"))) for side in ("left", "right"))
+    params = SgmParams(d_min=0, d_max=LAST)
+    return min(timed(lambda: match_semi_global(left, right, params, checked=True)) for _ in range(3))
+
+
+def seconds_of_pandora(python: Path, folder: Path) -> float:
+    """Return the wall time of Pandora's command on the first pair.
+
+    Raises:
+        PeerError: if it does not run.
+    """
+    views: dict[str, object] = {}
+    for side, disparities in (("left", [-LAST, 0]), ("right", [0, LAST])):
+        gray = folder / f"{side}.png"
+        Image.open(folder / side / "a.png").convert("L").save(gray)
+        views[side] = {"img": str(gray), "disp": disparities, "nodata": -9999}
+    settings = folder / "pandora.json"
+    settings.write_text(json.dumps({"input": views, "pipeline": _STEPS}))
+    begun = time.perf_counter()
+    done = subprocess.run([python.with_name("pandora"), settings, folder / "pandora"], capture_output=True, text=True)
+    if done.returncode:
+        raise PeerError(f"Pandora fails: {(done.stderr.strip() or 'no word').splitlines()[-1]}")
+    return time.perf_counter() - begun
+
+
+def against_pandora(folder: Path, times: int) -> list[Ratio]:
+    """Return our wall time over Pandora's; where that cannot be had, say so and return none."""
+    try:
+        python = environment((FOLDER / "peers" / "pandora").absolute())
+        seconds_of_pandora(python, folder)  # to warm up
+        runs = [(seconds_of(folder, "a")[0], seconds_of_pandora(python, folder)) for _ in range(times)]
+    except PeerError as error:
+        print(error, file=sys.stderr)
+        return []
+    seconds = median(ours for ours, _ in runs), median(theirs for _, theirs in runs)
+    what = "one pair, cold, wall time, times that of Pandora"
+    return [Ratio(what, tuple(ours / theirs for ours, theirs in runs), OF_PANDORA, at_most=True, seconds=seconds)]
+
+
+def of_further_pairs(folder: Path, times: int) -> list[Ratio]:
+    """Return the processor time of each further pair, seconds, and its wall time over that of SGBM."""
+    runs = [(seconds_of(folder, "a"), seconds_of(folder, "abc"), seconds_of_sgbm(folder)) for _ in range(times)]
+    wall, used = (tuple((three[k] - one[k]) / FURTHER for one, three, _ in runs) for k in range(2))
+    ratios = tuple(ours / sgbm for ours, (_, _, sgbm) in zip(wall, runs, strict=True))
+    both = median(wall), median(sgbm for _, _, sgbm in runs)
+    return [
+        Ratio("each further pair, processor seconds", used, PROCESSOR, at_most=True),
+        Ratio(
+            "each further pair, wall time, times that of OpenCV SGBM", ratios, TIMES_SGBM, at_most=True, seconds=both
+        ),
+    ]
+
+
 def main(
     shrink: Annotated[int, typer.Option(min=1, help="Divide the sides of the views by this.")] = 1,
-    times: Annotated[int, typer.Option(min=1, help="How often both commands are timed.")] = 3,
+    times: Annotated[int, typer.Option(min=1, help="How often each command is timed.")] = 3,
+    install: Annotated[bool, typer.Option(help="Install Pandora and measure against it.")] = True,
 ) -> None:
-    """Time both commands in turn."""
+    """Time the commands in turn."""
     with tempfile.TemporaryDirectory() as name:
         write_pairs(Path(name), shrink)
         seconds_of(Path(name), "a")  # to warm up
-        runs = [(seconds_of(Path(name), "a"), seconds_of(Path(name), "abc")) for _ in range(times)]
-    used = tuple((three[1] - one[1]) / FURTHER for one, three in runs)
-    seconds = median(one[0] for one, _ in runs), median(three[0] for _, three in runs)
-    what = "each further pair, processor seconds (4 are 2 s on two cores; remark: one pair, three)"
-    report("own_pairs", [Ratio(what, used, TARGET, at_most=True, seconds=seconds)])
+        ratios = against_pandora(Path(name), times) if install else []
+        report("own_pairs", [*ratios, *of_further_pairs(Path(name), times)])
 
 
 if __name__ == "__main__":

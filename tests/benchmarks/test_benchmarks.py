@@ -28,7 +28,7 @@ from benchmarks import (
     workers,
 )
 from benchmarks.harness import Ratio, compare
-from semidense.datasets import open_dataset
+from semidense.datasets import open_dataset, write_pfm
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.result import Result
@@ -61,7 +61,8 @@ def memory_on_little() -> None:
 
 
 def own_pairs_on_little() -> None:
-    own_pairs.main(shrink=8, times=1)
+    pytest.importorskip("cv2", reason="needs the extra baselines")
+    own_pairs.main(shrink=8, times=1, install=False)
 
 
 def training_on_little() -> None:
@@ -105,11 +106,18 @@ def test_the_matchers_are_told_with_their_errors_and_drawn(tmp_path: Path, capsy
 
 def test_worlds_stand_beside_each_other(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("cv2", reason="needs the extra baselines")
-    domains.main([TINY], setting=["semidense.R=0.9"], cache=tmp_path / "cache")
-    assert "a wanted error" in capsys.readouterr().out
+    (scene,) = open_dataset(TINY).scenes
+    truth = scene.load().truth
+    assert truth is not None
+    for ending in ("pfm", "checked.pfm"):
+        write_pfm(tmp_path / f"{scene.name}.{ending}", truth.disparity + np.float32(1.5))
+    domains.main([TINY], setting=["semidense.R=0.9"], pandora=tmp_path, cache=tmp_path / "cache")
+    printed = capsys.readouterr().out
+    assert "a wanted error" in printed and "at Pandora's density >1" in printed
     found = json.loads((tmp_path / "build" / "bench" / "domains.json").read_text())["datasets"][TINY]
     assert found["scenes"] == 1 and 0 <= found["dense >1"] <= 100
     assert found["dense >1"] >= found["dense >2"] >= found["dense >3"]
+    assert [found[f"Pandora >{limit}"] for limit in (1, 2)] == [100, 0]
 
 
 def test_shares_of_wrong_pixels_by_hand() -> None:
@@ -118,7 +126,9 @@ def test_shares_of_wrong_pixels_by_hand() -> None:
     score = np.float32([[0.95, 0.92, 0.5, 0.1, 1.0]])
     maps = domains._Maps(
         truth=row, mask=np.array([[True, True, True, True, False]]), own=row + np.float32([[0, 1.5, 0, 9, 9]]),
-        sgm=row + np.float32([[np.nan, 0, 5, np.nan, 0]]), sgm_dense=row + np.float32([[5, 0, 5, 0, 0]]),
+        others={
+            "SGBM": domains._Other(row + np.float32([[5, 0, 5, 0, 0]]), row + np.float32([[np.nan, 0, 5, np.nan, 0]]))
+        },
         score=score, chance={1.0: score},
     )  # fmt: skip
     shares = domains._shares(maps, score >= np.float32(0.9), domains.Ranking.of(score[maps.mask]), 1.0)
