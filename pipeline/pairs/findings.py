@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from semidense.datasets import Calibration, DisparityRange
-from semidense.stages.disparity.survey import ENOUGH, FIELDS
+from semidense.stages.disparity.survey import ENOUGH, FIELDS, PATCH, side_by_side
 from semidense.stages.stage import Array
 
 _EQUAL = 0.99
@@ -36,10 +36,10 @@ def findings(
     matches = dict(zip(FIELDS, survey["matches"].T, strict=True))
     if matches["y"].size < ENOUGH:
         return [f"only {matches['y'].size} places agree between the views: are they of the same scene, and rectified?"]
-    step = float(survey["step"][0])
+    step, places = float(survey["step"][0]), survey["matches"][:, :2]
     return [
         *_exchanged(matches["disparity"], step, searched, known.doffs if known else 0.0),
-        *_unrectified(matches["vertical"], step, aligned),
+        *(_unrectified(matches["vertical"], step, aligned) if side_by_side(places, PATCH * step) >= ENOUGH else ()),
     ]
 
 

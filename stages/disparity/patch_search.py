@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
+from semidense.stages.disparity.survey import PATCH
 
-RADIUS = 6
-SIDE = 2 * RADIUS + 1
-"""Rows and columns of a patch, px."""
+SIDE = PATCH
+RADIUS = SIDE // 2
 AREA = SIDE**2
 BESIDE = 2
 """A place of the row so near to the best one is no rival, px."""

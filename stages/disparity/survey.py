@@ -17,6 +17,8 @@ from semidense.stages.transforms.gray import to_gray
 
 LONGEST = 480
 """Longest side of the views that are compared, px."""
+PATCH = 13
+"""Side of a patch, px of the shrunken views."""
 REACH = 8
 """Rows above and below that are searched, px of the shrunken views."""
 ENOUGH = 100
@@ -66,6 +68,16 @@ def survey(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> Survey:
     rows = _matches(_square_sums(left, step), _square_sums(right, step), _CONTRAST * step**2)
     matches = np.concatenate([np.empty((0, len(FIELDS)), np.float32), *rows]) * np.float32(step)
     return Survey(matches.astype(np.float32), estimate_range(matches, step, left.shape[1]), step)
+
+
+def side_by_side(places: Array, side: float) -> int:
+    """Return how many squares of a side places lie in: patches that overlap tell the same.
+
+    Args:
+        places: (place, axis) px.
+        side: px.
+    """
+    return len(np.unique(places // side, axis=0))
 
 
 def shrink(view: NDArray[np.uint8], step: int) -> _Floats:

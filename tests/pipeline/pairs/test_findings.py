@@ -10,6 +10,7 @@ def survey(
     disparity: object, vertical: object = 0, *, count: int = 1000, equal: float = 0.1, step: int = 1
 ) -> dict[str, np.ndarray]:
     matches = np.zeros((count, 4), np.float32)
+    matches[:, 0], matches[:, 1] = 40 * step * (np.arange(count) // 40), 20 * step * (np.arange(count) % 40)
     matches[:, 2], matches[:, 3] = disparity, vertical
     return {"matches": matches, "equal": np.array([equal]), "step": np.array([step])}
 
@@ -40,6 +41,13 @@ def test_what_looks_wrong_is_said_in_one_line(found: dict[str, np.ndarray], expe
         assert "\n" not in said[0]
         with pytest.raises(ValueError, match=expected):
             raise ValueError(said[0])
+
+
+def test_matches_of_the_same_few_places_tell_nothing_of_the_rows() -> None:
+    """In a picture of 64 x 64 px hundreds of patches overlap, and the wrong ones among them overlap as well."""
+    small = survey(20, 6 * RAMP)
+    small["matches"][:, :2] /= 16
+    assert findings(small, None) == []
 
 
 def test_rows_that_were_shifted_are_told() -> None:

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
+from skimage.data import stereo_motorcycle
 
 from semidense.stages.disparity.alignment import LEAST_OFFSET, compute_alignment, offsets, plane
 from semidense.stages.disparity.declaration import ALIGNMENT
@@ -95,6 +96,16 @@ def random_offsets(terms: tuple[float, float, float], count: int = 1000) -> NDAr
     return np.column_stack([places, terms[0] + terms[1] * unit[:, 1] + terms[2] * unit[:, 0]])
 
 
+def measured(share: float) -> NDArray[np.float64]:
+    """Offsets of half a pixel, measured to a tenth, in an upper left part of the image."""
+    found = random_offsets((0.5, 0, 0)) + np.random.default_rng(3).normal(0, [0, 0, 0.1], (1000, 3))
+    return found * (share, share, 1)
+
+
+def test_offsets_from_everywhere_leave_nothing_open() -> None:
+    np.testing.assert_allclose(plane(measured(1), SIZE), (0.5, 0, 0), atol=0.05)
+
+
 def test_wrong_matches_do_not_bend_the_plane() -> None:
     found = random_offsets((0.3, 0.6, -0.2))
     found[:250, 2] += np.random.default_rng(1).uniform(1, 3, 250)
@@ -112,10 +123,18 @@ def test_wrong_matches_do_not_bend_the_plane() -> None:
             id="no plane",
         ),
         pytest.param(np.empty((0, 3)), id="no match"),
+        pytest.param(measured(0.3), id="all in a corner"),
+        pytest.param(measured(1) * (0, 1, 1), id="all in a row"),
     ],
 )
 def test_what_is_no_plane_is_none(found: NDArray[np.float64]) -> None:
     assert plane(found, SIZE) == (0, 0, 0)
+
+
+def test_a_small_picture_has_too_few_patches_side_by_side() -> None:
+    """Hundreds of matches in 64 x 64 px overlap each other: they tell no more than some thirty."""
+    left, right = (view[150:214, 250:314] for view in stereo_motorcycle()[:2])
+    assert not offset_of(aligned({"left": left, "right": right})).any()
 
 
 def test_an_offset_tells_where_it_was_measured() -> None:
