@@ -29,7 +29,7 @@ from skimage.data import stereo_motorcycle
 
 from benchmarks.cached_run import ENTRY
 from benchmarks.harness import FOLDER, Ratio, report, timed
-from benchmarks.pandora import environment
+from benchmarks.pandora import PIPELINE, environment
 from benchmarks.peers import PeerError
 from semidense.stages.baselines.declaration import SgmParams
 from semidense.stages.baselines.sgm import match_semi_global
@@ -44,15 +44,6 @@ PROCESSOR = 4.0
 """Processor seconds of a further pair: 2 s on two cores."""
 TIMES_SGBM = 12.0
 """2 s, where SGBM takes 0.17 s."""
-_STEPS = {
-    "matching_cost": {"matching_cost_method": "mc_cnn"},
-    "optimization": {"optimization_method": "sgm"},
-    "disparity": {"disparity_method": "wta", "invalid_disparity": "NaN"},
-    "refinement": {"refinement_method": "vfit"},
-    "filter": {"filter_method": "median"},
-    "validation": {"validation_method": "cross_checking_accurate"},
-}
-"""Pandora's pipeline."""
 
 
 def write_pairs(folder: Path, shrink: int) -> None:
@@ -102,7 +93,7 @@ def seconds_of_pandora(python: Path, folder: Path) -> float:
         Image.open(folder / side / "a.png").convert("L").save(gray)
         views[side] = {"img": str(gray), "disp": disparities, "nodata": -9999}
     settings = folder / "pandora.json"
-    settings.write_text(json.dumps({"input": views, "pipeline": _STEPS}))
+    settings.write_text(json.dumps({"input": views, "pipeline": PIPELINE}))
     begun = time.perf_counter()
     done = subprocess.run([python.with_name("pandora"), settings, folder / "pandora"], capture_output=True, text=True)
     if done.returncode:

@@ -1,7 +1,8 @@
 """Pandora's maps of the scenes of a dataset, in files that ``pipeline compare --map`` takes, and its confidences.
 
 ``python -m benchmarks.pandora middlebury:DIR/MiddEval3/trainingQ -o MAPS`` installs ``pandora``, libSGM and MC-CNN into
-an environment of its own, matches each scene (MC-CNN fast, libSGM, V-fit, median, cross-checking) and writes
+an environment of its own, matches each scene (MC-CNN fast, libSGM with the penalties that its plugin has for these
+costs, V-fit, median, cross-checking) and writes
 
 - ``SCENE.pfm``: the disparities; what the cross-checking rejects stays in, as in other dense maps;
 - ``SCENE.checked.pfm``: those that passed it;
@@ -12,6 +13,7 @@ and prints the area under the error curve of both confidences. Then ``pipeline c
 """
 
 import argparse
+import json
 import subprocess
 import sys
 import venv
@@ -27,8 +29,17 @@ from semidense.stages.transforms.gray import to_gray
 
 REQUIREMENTS = ("pandora==1.9.0", "pandora_plugin_libsgm==1.5.8", "pandora_plugin_mccnn==1.3.8")
 THRESHOLD = 1.0
+PIPELINE = {
+    "matching_cost": {"matching_cost_method": "mc_cnn"},
+    "optimization": {"optimization_method": "sgm", "penalty": {"penalty_method": "mc_cnn_fast_penalty"}},
+    "disparity": {"disparity_method": "wta", "invalid_disparity": "NaN"},
+    "refinement": {"refinement_method": "vfit"},
+    "filter": {"filter_method": "median"},
+    "validation": {"validation_method": "cross_checking_accurate"},
+}
+"""Pandora's pipeline. Its default penalties are made for other costs: with them half as many pixels again are wrong."""
 _PAIR = """
-import sys, warnings
+import json, sys, warnings
 import numpy as np, rasterio
 import pandora
 from pandora.check_configuration import check_conf
@@ -36,7 +47,7 @@ from pandora.constants import Criteria
 from pandora.img_tools import create_dataset_from_inputs
 from pandora.state_machine import PandoraMachine
 warnings.simplefilter("ignore")
-folder, costs = sys.argv[1:]
+folder, steps = sys.argv[1:]
 given = np.load(f"{folder}/pair.npz")
 first, last = map(int, given["disparities"])
 for name in ("left", "right"):
@@ -46,16 +57,9 @@ for name in ("left", "right"):
         file.write(view, 1)
 pandora.import_plugin()
 machine = PandoraMachine()
-pipeline = {
-    "matching_cost": {"matching_cost_method": costs} | ({} if costs == "mc_cnn" else {"window_size": 5}),
-    "cost_volume_confidence.ambiguity": {"confidence_method": "ambiguity"},
-    "cost_volume_confidence.risk": {"confidence_method": "risk"},
-    "optimization": {"optimization_method": "sgm"},
-    "disparity": {"disparity_method": "wta", "invalid_disparity": "NaN"},
-    "refinement": {"refinement_method": "vfit"},
-    "filter": {"filter_method": "median"},
-    "validation": {"validation_method": "cross_checking_accurate"},
-}
+costs, *others = json.loads(steps).items()
+measures = {f"cost_volume_confidence.{name}": {"confidence_method": name} for name in ("ambiguity", "risk")}
+pipeline = dict([costs, *measures.items(), *others])
 views = {"left": {"img": f"{folder}/left.tif", "disp": [-last, -first]}, "right": {"img": f"{folder}/right.tif"}}
 settings = check_conf({"input": views, "pipeline": pipeline}, machine)
 settings["input"]["right"]["disp"] = [first, last]
@@ -89,7 +93,7 @@ def environment(folder: Path) -> Path:
     return python
 
 
-def match(python: Path, scene: SceneSource, costs: str, folder: Path) -> dict[str, NDArray[np.float32]]:
+def match(python: Path, scene: SceneSource, folder: Path) -> dict[str, NDArray[np.float32]]:
     """Return Pandora's disparities, px, NaN none, before and after cross-checking, and its two confidences.
 
     Raises:
@@ -99,7 +103,7 @@ def match(python: Path, scene: SceneSource, costs: str, folder: Path) -> dict[st
     folder.mkdir(parents=True, exist_ok=True)
     bounds = np.array([scene.disparities.minimum, scene.disparities.maximum])
     np.savez(folder / "pair.npz", left=left, right=right, disparities=bounds)
-    done = subprocess.run([python, "-c", _PAIR, str(folder), costs], capture_output=True, text=True)
+    done = subprocess.run([python, "-c", _PAIR, folder, json.dumps(PIPELINE)], capture_output=True, text=True)
     if done.returncode:
         raise PeerError(f"Pandora fails on {scene.name}: {(done.stderr.strip() or 'no word').splitlines()[-1]}")
     with np.load(folder / "found.npz") as found:
@@ -134,10 +138,9 @@ def main() -> int:
     parser.add_argument("dataset")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the maps")
     parser.add_argument("--environment", type=Path, default=Path("build/pandora"), help="where Pandora is installed")
-    parser.add_argument("--costs", default="mc_cnn", help="Pandora's matching_cost_method")
     given = parser.parse_args()
     try:
-        rows = _all(given.dataset, environment(given.environment.absolute()), given.costs, given.output)
+        rows = _all(given.dataset, environment(given.environment.absolute()), given.output)
     except PeerError as error:
         print(f"benchmarks.pandora: {error}", file=sys.stderr)
         return 2
@@ -149,12 +152,12 @@ def _line(name: str, wrong: float, ambiguity: float, risk: float) -> str:
     return f"{name:20} {wrong:7.1f} {ambiguity:10.4f} {risk:10.4f}"
 
 
-def _all(dataset: str, python: Path, costs: str, folder: Path) -> list[list[float]]:
+def _all(dataset: str, python: Path, folder: Path) -> list[list[float]]:
     rows = []
     print(f"{'scene':20} {'wrong %':>7} {'ambiguity':>10} {'risk':>10}")
     for scene in open_dataset(dataset).scenes:
         name = scene.name.rsplit("/", 1)[-1]
-        found = match(python, scene, costs, folder / "work" / name)
+        found = match(python, scene, folder / "work" / name)
         write(found, name, folder)
         rows.append(figures(scene, found))
         print(_line(name, *rows[-1]), flush=True)

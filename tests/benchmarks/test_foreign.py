@@ -18,7 +18,7 @@ TINY = "synthetic:train=0,test=1,height=48,width=64,disparities=4"
 STAND_IN = """
 import sys
 import numpy as np
-folder, costs = sys.argv[1:]
+folder, _ = sys.argv[1:]
 given = np.load(f"{folder}/pair.npz")
 size, (first, last) = given["left"].shape, given["disparities"]
 valid = np.arange(size[1]) >= 8
@@ -38,7 +38,7 @@ def test_pandoras_maps_go_into_the_table(
 ) -> None:
     monkeypatch.setattr(pandora, "_PAIR", STAND_IN)
     (scene,) = open_dataset(TINY).scenes
-    found = pandora.match(Path(sys.executable), scene, "census", tmp_path / "work")
+    found = pandora.match(Path(sys.executable), scene, tmp_path / "work")
     assert np.isnan(found["checked"][:, :8]).all() and np.isfinite(found["disparity"]).all()
     pandora.write(found, scene.name, tmp_path)
     read = foreign.read_pandora(scene, tmp_path)
@@ -63,7 +63,7 @@ def test_a_pandora_that_does_not_run_is_one_line(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(pandora, "_PAIR", "raise SystemExit('no plugin')")
     (scene,) = open_dataset(TINY).scenes
     with pytest.raises(PeerError, match=r"Pandora fails on .*no plugin$"):
-        pandora.match(Path(sys.executable), scene, "census", tmp_path / "work")
+        pandora.match(Path(sys.executable), scene, tmp_path / "work")
 
 
 def test_each_kind_of_map_is_scored_by_a_net_of_other_scenes(
