@@ -11,7 +11,7 @@ from pathlib import Path
 from benchmarks.harness import PAIRS, Ratio, report, timed
 
 SCENE = "synthetic:train=0,test=1,height=128,width=256,disparities=24"
-ENTRY = "from semidense.pipeline.cli.main import main; main()"
+ENTRY = "from semidense.pipeline.cli.main import command; command()"
 
 
 def command(cache: Path, output: Path) -> None:

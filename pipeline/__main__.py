@@ -1,5 +1,5 @@
 """Run the command line: ``python -m semidense.pipeline`` is ``pipeline``."""
 
-from semidense.pipeline.cli.main import main
+from semidense.pipeline.cli.main import command
 
-main()
+command()

@@ -126,7 +126,7 @@ def invoke(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) 
         signal.signal(number, handler)
 
 
-ENTRY = [sys.executable, "-c", "from semidense.pipeline.cli.main import main; main()"]
+ENTRY = [sys.executable, "-c", "from semidense.pipeline.cli.main import command; command()"]
 
 
 @pytest.fixture(scope="session")

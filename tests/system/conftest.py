@@ -82,7 +82,7 @@ def look(browser: Any) -> Iterator[Callable[..., Seen]]:  # noqa: ANN401
 @contextmanager
 def serving(cache: Path) -> Iterator[tuple[str, int]]:
     """Run ``pipeline view`` over a cache; give its address and process."""
-    code = "from semidense.pipeline.cli.main import main; main()"
+    code = "from semidense.pipeline.cli.main import command; command()"
     command = [sys.executable, "-c", code, "view", "--cache", str(cache), "--port", "0", "--no-show"]
     process = subprocess.Popen(command, cwd=PROJECT, stdout=subprocess.PIPE, text=True)
     try:

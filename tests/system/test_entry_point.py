@@ -48,6 +48,19 @@ def test_the_installed_command_is_this_one() -> None:
     assert "Usage: pipeline" in ran.stdout
 
 
+@pytest.mark.parametrize(("arguments", "code"), [(["--version"], 0), (["runn"], 2)], ids=["a result", "a mistake"])
+def test_the_process_ends_with_the_command(project: Path, arguments: list[str], code: int) -> None:
+    """What was asked to be done at the end is done, and nothing is dismantled."""
+    script = (
+        "import atexit, sys\nfrom semidense.pipeline.cli.main import command\n"
+        "class Heavy:\n    def __del__(self): print('dismantled')\n"
+        "heavy = Heavy()\natexit.register(print, 'asked for')\ncommand()"
+    )
+    ran = subprocess.run([sys.executable, "-c", script, *arguments], cwd=project, capture_output=True, text=True)
+    assert ran.returncode == code
+    assert ran.stdout.splitlines()[-1] == "asked for"
+
+
 def test_results_go_to_stdout_and_notes_to_stderr(command: Command, trained: Result, tmp_path: Path) -> None:
     ran = command("run", *TRAINED, "--cache", trained.store.root, cwd=tmp_path)
     assert ran.code == 0

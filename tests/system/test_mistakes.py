@@ -108,8 +108,8 @@ if os.getuid() == 0 and sys.argv[-1] != "again":
     os.execv(sys.executable, [*sys.orig_argv, "again"])
 if sys.argv[-1] == "again":
     sys.argv.pop()
-from semidense.pipeline.cli.main import main
-main()
+from semidense.pipeline.cli.main import command
+command()
 """
 
 
