@@ -123,6 +123,7 @@ def _require_streams() -> None:
 def _leave(code: int) -> NoReturn:
     """Exit at once: drafts are deleted by now, and tasks that still compute have nothing left to write to."""
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError):
-            stream.flush()
+        if stream is not None:  # as it is of a standard output that is closed
+            with suppress(OSError):
+                stream.flush()
     os._exit(code)

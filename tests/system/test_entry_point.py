@@ -61,6 +61,14 @@ def test_the_process_ends_with_the_command(project: Path, arguments: list[str], 
     assert ran.stdout.splitlines()[-1] == "asked for"
 
 
+def test_a_closed_output_is_one_line(project: Path) -> None:
+    script = "import os, sys; os.close(1); os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
+    command = [sys.executable, "-c", script, "-m", "semidense.pipeline", "status"]
+    ran = subprocess.run(command, cwd=project, capture_output=True, text=True)
+    assert (ran.returncode, ran.stderr.count("\n")) == (2, 1)
+    assert "standard output is closed" in ran.stderr
+
+
 def test_results_go_to_stdout_and_notes_to_stderr(command: Command, trained: Result, tmp_path: Path) -> None:
     ran = command("run", *TRAINED, "--cache", trained.store.root, cwd=tmp_path)
     assert ran.code == 0
