@@ -28,8 +28,8 @@ from PIL import Image
 from skimage.data import stereo_motorcycle
 
 from benchmarks.cached_run import ENTRY
-from benchmarks.harness import FOLDER, Ratio, report, timed
-from benchmarks.pandora import PIPELINE, environment
+from benchmarks.harness import Ratio, report, timed
+from benchmarks.pandora import ENVIRONMENT, PIPELINE, environment
 from benchmarks.peers import PeerError
 from semidense.stages.baselines.declaration import SgmParams
 from semidense.stages.baselines.sgm import match_semi_global
@@ -104,7 +104,7 @@ def seconds_of_pandora(python: Path, folder: Path) -> float:
 def against_pandora(folder: Path, times: int) -> list[Ratio]:
     """Return our wall time over Pandora's; where that cannot be had, say so and return none."""
     try:
-        python = environment((FOLDER / "peers" / "pandora").absolute())
+        python = environment(ENVIRONMENT.absolute())
         seconds_of_pandora(python, folder)  # to warm up
         runs = [(seconds_of(folder, "a")[0], seconds_of_pandora(python, folder)) for _ in range(times)]
     except PeerError as error:

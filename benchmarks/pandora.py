@@ -28,6 +28,8 @@ from semidense.stages.metrics.ranking import ranked
 from semidense.stages.transforms.gray import to_gray
 
 REQUIREMENTS = ("pandora==1.9.0", "pandora_plugin_libsgm==1.5.8", "pandora_plugin_mccnn==1.3.8")
+ENVIRONMENT = Path("build/pandora")
+"""Where Pandora is installed, if no other folder is given."""
 THRESHOLD = 1.0
 PIPELINE = {
     "matching_cost": {"matching_cost_method": "mc_cnn"},
@@ -37,7 +39,7 @@ PIPELINE = {
     "filter": {"filter_method": "median"},
     "validation": {"validation_method": "cross_checking_accurate"},
 }
-"""Pandora's pipeline. Its default penalties are made for other costs: with them half as many pixels again are wrong."""
+"""Pandora's pipeline. With its default penalties, made for other costs, 24.9 % of MiddEval3 are wrong for 18.2."""
 _PAIR = """
 import json, sys, warnings
 import numpy as np, rasterio
@@ -82,14 +84,15 @@ def environment(folder: Path) -> Path:
     Raises:
         PeerError: if pip cannot install it.
     """
-    python = folder / "bin" / "python"
-    if not python.exists():
+    python, complete = folder / "bin" / "python", folder / ".complete"
+    if not complete.exists():
         venv.create(folder, with_pip=True)
         done = subprocess.run(
             [python, "-m", "pip", "install", "--quiet", *REQUIREMENTS], capture_output=True, text=True
         )
         if done.returncode:
             raise PeerError(f"Pandora cannot be installed: {(done.stderr.strip() or 'pip fails').splitlines()[-1]}")
+        complete.touch()
     return python
 
 
@@ -137,7 +140,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("dataset")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the maps")
-    parser.add_argument("--environment", type=Path, default=Path("build/pandora"), help="where Pandora is installed")
+    parser.add_argument("--environment", type=Path, default=ENVIRONMENT, help="where Pandora is installed")
     given = parser.parse_args()
     try:
         rows = _all(given.dataset, environment(given.environment.absolute()), given.output)

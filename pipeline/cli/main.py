@@ -16,6 +16,10 @@ from semidense.pipeline.cli.commands.cache.commands import cache_app
 from semidense.pipeline.cli.commands.data import commands as data
 from semidense.stages.compute.allocator import keep_freed_memory
 
+_COLLECTED_AFTER = 10_000
+"""Objects that are made before Python looks for lost ones; by default 700. Modules make hundreds of thousands
+that stay. To look through them again and again takes a tenth of a short command's time."""
+
 
 class _Commands(typer.core.TyperGroup):
     """The commands; one that fails with EOFError is a fault of the program like any other, not a wish to stop."""
@@ -68,14 +72,9 @@ def _stop(number: int, _: Any) -> None:  # noqa: ANN401
     raise _Stopped(number)
 
 
-_MADE = 10_000
-"""Objects that are made before Python looks for lost ones; by default 700. Modules make hundreds of thousands
-that stay. To look through them again and again takes a tenth of a short command's time."""
-
-
 def command() -> None:
     """Run the command line in a process that ends with it."""
-    gc.set_threshold(_MADE, *gc.get_threshold()[1:])
+    gc.set_threshold(_COLLECTED_AFTER, *gc.get_threshold()[1:])
     code = 0
     try:
         main()
