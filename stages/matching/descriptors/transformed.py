@@ -9,7 +9,7 @@ rows and columns of such an image, and so are the pixels that it answers. From l
 
 for some tiles at a time, so that they stay in the processor's cache. A number's tiles lie side by side, as the product
 takes them: of another order it would make a copy first. The first layer has too few channels to gain.
-What is multiplied, and what comes of it, is float32 or bfloat16, as in ``transformed``.
+All of it is float32.
 """
 
 import math
@@ -24,7 +24,7 @@ from torch.nn import functional
 from semidense.stages.compute.kernel import inlined, kernel
 from semidense.stages.matching.declaration import DILATIONS, REACH
 from semidense.stages.matching.descriptors.net import WIDTH, DescriptorNet
-from semidense.stages.matching.winograd.storage import Flat, Stored, stored
+from semidense.stages.matching.winograd.storage import Flat
 from semidense.stages.matching.winograd.tiles import (
     TILE,
     Four,
@@ -59,7 +59,7 @@ def corner(tile: int, step: int, width: int) -> Corner:
 
 
 @inlined
-def six_pixels(maps: NDArray[np.float32], y: int, x: int, step: int) -> Six[Stored]:
+def six_pixels(maps: NDArray[np.float32], y: int, x: int, step: int) -> Six[NDArray[np.float32]]:
     """Return the channels of six pixels of a row, ``step`` px apart."""
     return (
         maps[y, x],
@@ -72,7 +72,7 @@ def six_pixels(maps: NDArray[np.float32], y: int, x: int, step: int) -> Six[Stor
 
 
 @kernel
-def split(maps: NDArray[np.float32], first: int, count: int, step: int, tiles: Stored) -> None:
+def split(maps: NDArray[np.float32], first: int, count: int, step: int, tiles: NDArray[np.float32]) -> None:
     """Transform ``count`` tiles of maps (y, x, WIDTH) from tile ``first`` on, into (36, tile, WIDTH)."""
     row = 6 * WIDTH
     part = np.empty(6 * row, np.float32)  # one tile, transformed along its rows
@@ -89,7 +89,9 @@ def split(maps: NDArray[np.float32], first: int, count: int, step: int, tiles: S
 
 
 @kernel
-def merge(products: Stored, bias: Flat, floor: np.float32, first: int, step: int, maps: NDArray[np.float32]) -> None:
+def merge(
+    products: NDArray[np.float32], bias: Flat, floor: np.float32, first: int, step: int, maps: NDArray[np.float32]
+) -> None:
     """Transform products (36, tile, WIDTH) back, add the bias, cut at the floor, into maps (y, x, WIDTH)."""
     row = 6 * WIDTH
     part = np.empty(TILE * row, np.float32)
@@ -112,9 +114,9 @@ def _floored(v: Four[np.float32], bias: np.float32, floor: np.float32) -> Four[n
     return max(v[0] + bias, floor), max(v[1] + bias, floor), max(v[2] + bias, floor), max(v[3] + bias, floor)
 
 
-def kernels_of(net: DescriptorNet, dtype: torch.dtype = torch.float32) -> list[Tensor]:
+def kernels_of(net: DescriptorNet) -> list[Tensor]:
     """Return the kernels of every layer but the first in the transformed domain; gradients flow back to them."""
-    return [spread(layer.weight).to(dtype) for layer in [*net.hidden[1:], net.out]]
+    return [spread(layer.weight) for layer in [*net.hidden[1:], net.out]]
 
 
 def convolved(maps: Tensor, weight: Tensor, bias: Tensor, floor: float, step: int) -> Tensor:
@@ -122,21 +124,21 @@ def convolved(maps: Tensor, weight: Tensor, bias: Tensor, floor: float, step: in
 
     Args:
         maps: float32, contiguous; y and x multiples of 4 step.
-        weight: (36, 64, 64), the transformed kernels; their dtype is that of what is multiplied.
+        weight: (36, 64, 64), the transformed kernels.
         bias: (64,).
         floor: 0 for a ReLU, minus infinity for none.
         step: distance of the kernels' taps, px.
     """
     made = torch.empty(maps.shape[0] - 2 * step, maps.shape[1] - 2 * step, WIDTH)
     total = made.shape[0] * made.shape[1] // TILE**2
-    tiles = torch.empty(36, TILES, WIDTH, dtype=weight.dtype)
-    products = torch.empty(36 * TILES * WIDTH, dtype=weight.dtype)
+    tiles = torch.empty(36, TILES, WIDTH)
+    products = torch.empty(36 * TILES * WIDTH)
     for first in range(0, total, TILES):
         count = min(TILES, total - first)
-        split(maps.numpy(), first, count, step, stored(tiles))
+        split(maps.numpy(), first, count, step, tiles.numpy())
         answers = products[: 36 * count * WIDTH].view(36, count, WIDTH)
         torch.bmm(tiles[:, :count], weight, out=answers)
-        merge(stored(answers), bias.numpy(), np.float32(floor), first, step, made.numpy())
+        merge(answers.numpy(), bias.numpy(), np.float32(floor), first, step, made.numpy())
     return made
 
 

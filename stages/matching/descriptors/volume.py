@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from semidense.stages.compute.precision import Precision, dtype_of
+from semidense.stages.compute.precision import Precision
 from semidense.stages.compute.threads import one_thread
 from semidense.stages.matching.declaration import REACH
 from semidense.stages.matching.descriptors.net import DescriptorNet
-from semidense.stages.matching.descriptors.transformed import kernels_of, transformed_descriptors
+from semidense.stages.matching.descriptors.view import described_views
 from semidense.stages.stage import StageError, require_shape
 
 COLUMNS = 64
@@ -53,7 +53,7 @@ def padded_fast_costs(
     height, width = (length - 2 * REACH for length in channels.shape[2:])
     volume = np.empty((height, width, len(disparities)), np.float32)
     with torch.inference_mode():
-        left, right = _descriptors(net, torch.from_numpy(np.ascontiguousarray(channels)), precision)
+        left, right = described_views(net, channels, precision)
         smallest, largest = disparities[0], disparities[-1]
         # Beyond the right view there are zeros, so that every product has all its diagonals.
         right = functional.pad(right, (0, 0, max(0, largest), max(0, -smallest)))
@@ -66,12 +66,6 @@ def padded_fast_costs(
     matched = np.arange(width)[:, None] - np.array(disparities)  # the right pixel's column
     volume[:, (matched < 0) | (matched >= width)] = np.nan
     return volume
-
-
-def _descriptors(net: DescriptorNet, views: Tensor, precision: Precision) -> list[Tensor]:
-    """Return the descriptors of each padded view: (y, x, number)."""
-    kernels = kernels_of(net, dtype_of(precision))
-    return [transformed_descriptors(net, kernels, view) for view in views]
 
 
 def diagonals(products: Tensor, count: int) -> Tensor:

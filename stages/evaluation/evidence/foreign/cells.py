@@ -7,12 +7,12 @@ import torch
 from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.compute.precision import Precision, dtype_of
+from semidense.stages.compute.precision import Precision
 from semidense.stages.compute.threads import one_thread
 from semidense.stages.evaluation.declaration import RADIUS
 from semidense.stages.matching.declaration import REACH
 from semidense.stages.matching.descriptors.net import descriptor_net_from_parameters
-from semidense.stages.matching.descriptors.transformed import kernels_of, transformed_descriptors
+from semidense.stages.matching.descriptors.view import described_views
 from semidense.stages.stage import Network
 
 OFFSETS = range(-2, 4)
@@ -70,11 +70,9 @@ def described(channels: NDArray[np.float32], descriptor_net: Network, precision:
     """
     net = descriptor_net_from_parameters(descriptor_net["parameters"], channels.shape[1])
     with torch.inference_mode():
-        kernels = kernels_of(net, dtype_of(precision))
         beyond = _CUT - REACH  # the net takes what a descriptor sees
-        views = torch.from_numpy(np.ascontiguousarray(channels[..., beyond:-beyond, beyond:-beyond]))
-        left, right = (transformed_descriptors(net, kernels, view).numpy() for view in views)
-        return Described(left, right, float(net.log_scale.exp()), float(net.bias))
+        left, right = described_views(net, channels[..., beyond:-beyond, beyond:-beyond], precision)
+        return Described(left.numpy(), right.numpy(), float(net.log_scale.exp()), float(net.bias))
 
 
 @kernel
