@@ -36,7 +36,7 @@ def fast_bfloat16(*, transformed: bool = False) -> bool:
 
     Args:
         transformed: of convolutions that run in a transformed domain in float32 alone. With a third of the products
-            they are as fast as plain ones with AVX512-BF16; matrix units (AMX) alone outrun them.
+            they are as fast as plain ones with AVX512-BF16, or faster; matrix units (AMX) alone outrun them.
     """
     fast = _MATRIX_UNITS if transformed else _MATRIX_UNITS | _INSTRUCTIONS
     return not fast.isdisjoint(cpu_flags())

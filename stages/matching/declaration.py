@@ -148,6 +148,11 @@ class CostVolumeParams(Params):
     )
 
     @property
+    def transformed(self) -> bool:
+        """Whether it is transformed in float32 alone, which decides what ``precision=auto`` is."""
+        return self.mode == "fast"
+
+    @property
     def context(self) -> int:
         """Pixels that a cell looks away from its own."""
         return {"exact": RADIUS, "guided": MARGIN, "fast": REACH}[self.mode]

@@ -17,9 +17,11 @@ RUN = ("costvolume", "confidence", "evaluation_net")
     ],
 )
 def test_auto_is_what_the_cpu_is_fast_at(flag: str, trained: str, run: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The gradients of transformed convolutions are in float32 alone, which plain ones outrun with AMX only."""
+    """Gradients and descriptors are transformed in float32 alone, which plain convolutions outrun with AMX only."""
     monkeypatch.setattr(precision, "cpu_flags", lambda: frozenset({flag}))
     config = Config.load()
     for sections, expected in ((TRAINED, trained), (RUN, run)):
         for section in sections:
             assert resolved(getattr(config, section), None).precision == expected, section
+    fast = config.costvolume.model_copy(update={"mode": "fast"})
+    assert resolved(fast, None).precision == trained
