@@ -55,7 +55,7 @@ evaluation: $(READY)  ## DATA=DIR MODE=guided: train the evaluation-Net of such 
 evidence: $(READY)  ## DATA=DIR: train what weighs the evidence of indoor aggregated maps, and put its weights in place
 	@test -n "$(DATA)" || { echo "make evidence: say where the Middlebury sets are: make evidence DATA=DIR"; exit 2; }
 	$(BIN)/pipeline run middlebury:$(DATA) --preset robust --train --upto evidence_net --output build/robust \
-		--set training.weights=indoor --set training.cross_fit=false --set channels.align=false \
+		--set training.weights=indoor --set training.cross_fit=false \
 		--set 'training.shipped=["matching_net", "descriptor_net", "evaluation_net"]'
 	cp build/robust/evidence_net.safetensors stages/weights/
 
@@ -63,12 +63,10 @@ train-general: $(READY)  ## DATA=DIR: train the preset robust on DIR/middlebury 
 	@test -n "$(DATA)" || { echo "make train-general: say where the data is: make train-general DATA=DIR"; exit 2; }
 	for product in descriptor_net evidence_net evaluation_net; do \
 		$(BIN)/pipeline run middlebury:$(DATA)/middlebury+kitti2012:$(DATA)/kitti2012 --preset robust --train \
-			--set channels.align=false \
 			--upto $$product --output build/general/$$product || exit; \
 	done
 	for px in 1 2 3; do \
 		$(BIN)/pipeline run middlebury:$(DATA)/middlebury+kitti2012:$(DATA)/kitti2012 --preset robust --train \
-			--set channels.align=false \
 			--upto calibration --set calibration.tolerance=$$px --output build/general/$$px || exit; \
 	done
 	for net in descriptor_net evidence_net evaluation_net; do \

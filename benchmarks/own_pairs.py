@@ -1,4 +1,4 @@
-"""The time that `match` takes for a new pair and for each further one: ``python -m benchmarks.own_pairs``.
+"""The time that `match` and `score` take for a reader's own pair: ``python -m benchmarks.own_pairs``.
 
 A command matches one pair of 741 x 500 px and 71 disparities, another one the same and two more, each in an empty
 cache, files and pictures included. Loops are compiled beforehand.
@@ -7,6 +7,7 @@ cache, files and pictures included. Loops are compiled beforehand.
   Pandora is installed into an environment of its own, once.
 - The difference of the two commands is what two further pairs take: in processor time, which other work on the machine
   changes little, and by the clock, against OpenCV's SGBM on one thread.
+- A third command scores SGBM's map of the pair, with both views, in an empty cache.
 
 All are timed in turn.
 """
@@ -31,6 +32,7 @@ from benchmarks.cached_run import ENTRY
 from benchmarks.harness import Ratio, report, timed
 from benchmarks.pandora import ENVIRONMENT, PIPELINE, environment
 from benchmarks.peers import PeerError
+from semidense.datasets.formats.pfm import write_pfm
 from semidense.stages.baselines.declaration import SgmParams
 from semidense.stages.baselines.sgm import match_semi_global
 from semidense.stages.transforms.gray import to_gray
@@ -44,6 +46,9 @@ PROCESSOR = 4.0
 """Processor seconds of a further pair: 2 s on two cores."""
 TIMES_SGBM = 12.0
 """2 s, where SGBM takes 0.17 s."""
+SCORED = 3.0
+"""Seconds that scoring a map takes in an empty cache."""
+MAP = "sgbm.pfm"
 
 
 def write_pairs(folder: Path, shrink: int) -> None:
@@ -56,28 +61,36 @@ def write_pairs(folder: Path, shrink: int) -> None:
             Image.fromarray(np.ascontiguousarray(view)).save(folder / side / f"{name}.png")
 
 
-def seconds_of(folder: Path, scenes: str) -> tuple[float, float]:
-    """Return the wall time and the processor time of a command that matches pairs of a folder, named by a letter."""
+def seconds_of_match(folder: Path, scenes: str) -> tuple[float, float]:
+    """Return the wall time and the processor time of matching pairs of a folder, named by a letter."""
+    chosen = [option for scene in scenes for option in ("--scene", scene)]
+    return seconds_of("match", folder / "left", folder / "right", "--min-disp", 0, "--max-disp", LAST, *chosen)
+
+
+def seconds_of_score(folder: Path) -> float:
+    """Return the wall time of scoring SGBM's map of the first pair."""
+    return seconds_of("score", folder / "left" / "a.png", folder / MAP, folder / "right" / "a.png")[0]
+
+
+def seconds_of(*command: object) -> tuple[float, float]:
+    """Return the wall time and the processor time of a command in an empty cache."""
     with tempfile.TemporaryDirectory() as scratch:
-        sides = [str(folder / side) for side in ("left", "right")]
-        options = ["--min-disp", "0", "--max-disp", str(LAST), "--cache", f"{scratch}/cache", "-o", f"{scratch}/out"]
-        chosen = [option for scene in scenes for option in ("--scene", scene)]
+        given = [*map(str, command), "--cache", f"{scratch}/cache", "-o", f"{scratch}/out"]
         begun, before = time.perf_counter(), os.times()
-        subprocess.run(
-            [sys.executable, "-c", ENTRY, "match", *sides, *options, *chosen], check=True, capture_output=True
-        )
+        subprocess.run([sys.executable, "-c", ENTRY, *given], check=True, capture_output=True)
         after = os.times()
         used = after.children_user + after.children_system - before.children_user - before.children_system
         return time.perf_counter() - begun, used
 
 
 def seconds_of_sgbm(folder: Path) -> float:
-    """Return the wall time of OpenCV's SGBM on the first pair, eight paths, one thread."""
+    """Return the wall time of OpenCV's SGBM on the first pair, eight paths, one thread; write its map."""
     import cv2
 
     cv2.setNumThreads(1)
     left, right = (to_gray(np.asarray(Image.open(folder / side / "a.png"))) for side in ("left", "right"))
     params = SgmParams(d_min=0, d_max=LAST)
+    write_pfm(folder / MAP, match_semi_global(left, right, params, checked=True))
     return min(timed(lambda: match_semi_global(left, right, params, checked=True)) for _ in range(3))
 
 
@@ -106,7 +119,7 @@ def against_pandora(folder: Path, times: int) -> list[Ratio]:
     try:
         python = environment(ENVIRONMENT.absolute())
         seconds_of_pandora(python, folder)  # to warm up
-        runs = [(seconds_of(folder, "a")[0], seconds_of_pandora(python, folder)) for _ in range(times)]
+        runs = [(seconds_of_match(folder, "a")[0], seconds_of_pandora(python, folder)) for _ in range(times)]
     except PeerError as error:
         print(error, file=sys.stderr)
         return []
@@ -117,7 +130,9 @@ def against_pandora(folder: Path, times: int) -> list[Ratio]:
 
 def of_further_pairs(folder: Path, times: int) -> list[Ratio]:
     """Return the processor time of each further pair, seconds, and its wall time over that of SGBM."""
-    runs = [(seconds_of(folder, "a"), seconds_of(folder, "abc"), seconds_of_sgbm(folder)) for _ in range(times)]
+    runs = [
+        (seconds_of_match(folder, "a"), seconds_of_match(folder, "abc"), seconds_of_sgbm(folder)) for _ in range(times)
+    ]
     wall, used = (tuple((three[k] - one[k]) / FURTHER for one, three, _ in runs) for k in range(2))
     ratios = tuple(ours / sgbm for ours, (_, _, sgbm) in zip(wall, runs, strict=True))
     both = median(wall), median(sgbm for _, _, sgbm in runs)
@@ -129,6 +144,12 @@ def of_further_pairs(folder: Path, times: int) -> list[Ratio]:
     ]
 
 
+def of_score(folder: Path, times: int) -> Ratio:
+    """Return the seconds of scoring a map."""
+    taken = tuple(seconds_of_score(folder) for _ in range(times))
+    return Ratio("scoring a map, cold, seconds", taken, SCORED, at_most=True)
+
+
 def main(
     shrink: Annotated[int, typer.Option(min=1, help="Divide the sides of the views by this.")] = 1,
     times: Annotated[int, typer.Option(min=1, help="How often each command is timed.")] = 3,
@@ -137,9 +158,9 @@ def main(
     """Time the commands in turn."""
     with tempfile.TemporaryDirectory() as name:
         write_pairs(Path(name), shrink)
-        seconds_of(Path(name), "a")  # to warm up
+        seconds_of_match(Path(name), "a")  # to warm up
         ratios = against_pandora(Path(name), times) if install else []
-        report("own_pairs", [*ratios, *of_further_pairs(Path(name), times)])
+        report("own_pairs", [*ratios, *of_further_pairs(Path(name), times), of_score(Path(name), times)])
 
 
 if __name__ == "__main__":
