@@ -22,7 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.harness import write
-from semidense.datasets import open_dataset, read_pfm
+from semidense.datasets import SceneSource, open_dataset, read_pfm
 from semidense.pipeline.api import Task, carry_out
 from semidense.pipeline.execution.progress import ProgressWatch
 from semidense.pipeline.execution.watch import Watch
@@ -49,6 +49,8 @@ def main(
 ) -> None:
     """Print and write the figures of each data set."""
     tasks = [Task(spec, settings=setting or (), preset=preset, cache=cache) for spec in dataset]
+    for task in tasks:
+        _require_maps(_with_truth(task), pandora)
     found = {str(task.dataset): _figures(task, pandora) for task in tasks}
     write("domains", {"preset": preset, "settings": setting or [], "datasets": found})
     others = ["SGBM"] if pandora is None else ["SGBM", "Pandora"]
@@ -75,7 +77,7 @@ def _print(title: str, found: Mapping[str, Figures], names: Sequence[str]) -> No
 
 def _figures(task: Task, pandora: Path | None) -> Figures:
     """Return the mean of each figure over the scenes with a truth, and the calibration error of all their pixels."""
-    scenes = [scene for scene in open_dataset(str(task.dataset)).scenes if scene.has_truth]
+    scenes = _with_truth(task)
     chosen = open_dataset(str(task.dataset)).select([scene.name for scene in scenes])
 
     def made(tolerance: float, watch: Watch) -> Result:
@@ -90,6 +92,23 @@ def _figures(task: Task, pandora: Path | None) -> Figures:
     means = {name: float(np.nanmean([row[name] for row in rows])) for name in rows[0]}
     errors = {name: value for limit in TOLERANCES for name, value in _calibration_errors(maps, limit).items()}
     return means | errors | {"scenes": len(rows)}
+
+
+def _with_truth(task: Task) -> list[SceneSource]:
+    return [scene for scene in open_dataset(str(task.dataset)).scenes if scene.has_truth]
+
+
+def _require_maps(scenes: Sequence[SceneSource], pandora: Path | None) -> None:
+    """Refuse a folder that lacks a map, before anything is matched."""
+    for file in (file for scene in scenes if pandora for file in _files_of(pandora, scene.name)):
+        if not file.is_file():
+            raise typer.BadParameter(f"{file} is not there: make it by `python -m benchmarks.pandora`")
+
+
+def _files_of(pandora: Path, scene: str) -> tuple[Path, Path]:
+    """Return the files of Pandora's maps of a scene: dense, and checked."""
+    name = scene.rsplit("/", 1)[-1]
+    return pandora / f"{name}.pfm", pandora / f"{name}.checked.pfm"
 
 
 class _Other(NamedTuple):
@@ -119,8 +138,7 @@ class _Maps:
         truth, sgm = result.open("truth", scene), result.open("sgm", scene)
         others = {"SGBM": _Other(sgm["dense"].values, sgm["disparity"].values)}
         if pandora is not None:
-            name = scene.rsplit("/", 1)[-1]
-            others["Pandora"] = _Other(read_pfm(pandora / f"{name}.pfm"), read_pfm(pandora / f"{name}.checked.pfm"))
+            others["Pandora"] = _Other(*map(read_pfm, _files_of(pandora, scene)))
         return cls(
             truth["disparity"].values,
             truth["nonocc"].values & np.isfinite(truth["disparity"].values),

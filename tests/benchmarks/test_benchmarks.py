@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import typer
 
 from benchmarks import (
     aggregation,
@@ -118,6 +119,13 @@ def test_worlds_stand_beside_each_other(tmp_path: Path, capsys: pytest.CaptureFi
     assert found["scenes"] == 1 and 0 <= found["dense >1"] <= 100
     assert found["dense >1"] >= found["dense >2"] >= found["dense >3"]
     assert [found[f"Pandora >{limit}"] for limit in (1, 2)] == [100, 0]
+
+
+def test_a_map_that_is_not_there_is_told_before_anything_is_matched(tmp_path: Path) -> None:
+    (scene,) = open_dataset(TINY).scenes
+    with pytest.raises(typer.BadParameter, match=rf"{scene.name}\.pfm is not there"):
+        domains.main([TINY], pandora=tmp_path, cache=tmp_path / "cache")
+    assert not (tmp_path / "cache").exists()
 
 
 def test_shares_of_wrong_pixels_by_hand() -> None:
