@@ -55,7 +55,7 @@ evaluation: $(READY)  ## DATA=DIR MODE=guided: train the evaluation-Net of such 
 evidence: $(READY)  ## DATA=DIR: train what weighs the evidence of indoor aggregated maps, and put its weights in place
 	@test -n "$(DATA)" || { echo "make evidence: say where the Middlebury sets are: make evidence DATA=DIR"; exit 2; }
 	$(BIN)/pipeline run middlebury:$(DATA) --preset robust --train --upto evidence_net --output build/robust \
-		--set training.weights=indoor --set training.cross_fit=false \
+		--set training.weights=indoor --set training.cross_fit=false --set channels.align=false \
 		--set 'training.shipped=["matching_net", "descriptor_net", "evaluation_net"]'
 	cp build/robust/evidence_net.safetensors stages/weights/
 
