@@ -24,6 +24,9 @@ from pathlib import Path
 from semidense.cache.errors import CacheUnavailable, InvalidKey
 from semidense.cache.files import is_folder, make_folder, reading, require_no_link, writing
 
+_URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):(?:/+(.*))?", re.ASCII)  # of a URL alone, a path keeps no slash
+SCHEMES = ("s3", "gs", "az", "memory")
+"""Object stores that a cache can be in."""
 _KEY = re.compile(r"[0-9a-f]{64}", re.ASCII)
 _LEASE = "[0-9a-f]{32}"
 _FORMS = {
@@ -222,3 +225,20 @@ def _keys(folder: Path, suffix: str) -> Iterator[str]:
             key = name.removesuffix(suffix)
             if _KEY.fullmatch(key) and name == key + suffix and shelf.name == key[:2]:
                 yield key
+
+
+def place_of(root: Path | str) -> Path | str:
+    """Return a folder's absolute path, or the one spelling of a URL; a path has lost one of its slashes.
+
+    Raises:
+        CacheUnavailable: if it is a URL of another kind than ``SCHEMES``.
+    """
+    match = _URL.fullmatch(str(root))
+    if match is None:
+        return Path(root).absolute()
+    if match[1].lower() not in SCHEMES or not match[2]:
+        raise CacheUnavailable(
+            f"{root} is no place for a cache: name a folder, or an object store as "
+            + ", ".join(f"{scheme}://NAME/PREFIX" for scheme in SCHEMES[:3])
+        )
+    return f"{match[1].lower()}://{match[2].rstrip('/')}"

@@ -1,6 +1,5 @@
 """The cache as its users see it: find, require, open, begin."""
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -15,18 +14,13 @@ from semidense.cache.entries.folder import FolderBackend
 from semidense.cache.errors import CacheUnavailable, DamagedEntry, EntryNotFound
 from semidense.cache.files import in_threads
 from semidense.cache.keys.recipe import Recipe, require_texts
-from semidense.cache.layout import Layout
+from semidense.cache.layout import Layout, place_of
 
 T = TypeVar("T")
 if TYPE_CHECKING:
     import xarray
     import zarr
     from numpy.typing import NDArray
-
-
-_URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):(?:/+(.*))?", re.ASCII)  # of a URL alone, a path keeps no slash
-SCHEMES = ("s3", "gs", "az", "memory")
-"""Object stores that a cache can be in."""
 
 
 @dataclass(frozen=True, init=False)
@@ -53,7 +47,7 @@ class Store:
     def __init__(self, root: Path | str, verify: Policy = "full") -> None:
         if verify not in ("full", "size"):
             raise ValueError(f"verify is {verify!r}: it must be full or size")
-        object.__setattr__(self, "root", _place(root))
+        object.__setattr__(self, "root", place_of(root))
         object.__setattr__(self, "verify", verify)
 
     @property
@@ -298,16 +292,3 @@ class Store:
             CacheUnavailable: if the place holds somebody else's files, or refuses.
         """
         return self.backend.sweep_drafts()
-
-
-def _place(root: Path | str) -> Path | str:
-    """Return a folder's absolute path, or the one spelling of a URL; a path has lost one of its slashes."""
-    match = _URL.fullmatch(str(root))
-    if match is None:
-        return Path(root).absolute()
-    if match[1].lower() not in SCHEMES or not match[2]:
-        raise CacheUnavailable(
-            f"{root} is no place for a cache: name a folder, or an object store as "
-            + ", ".join(f"{scheme}://NAME/PREFIX" for scheme in SCHEMES[:3])
-        )
-    return f"{match[1].lower()}://{match[2].rstrip('/')}"

@@ -25,7 +25,8 @@ from semidense.stages.evaluation.evidence.declaration import EVIDENCE_CONFIDENCE
 from semidense.stages.evaluation.evidence.foreign.declaration import FOREIGN_CONFIDENCE, FOREIGN_NET, FOREIGN_SAMPLES
 from semidense.stages.evaluation.filtering import SEMIDENSE
 from semidense.stages.evaluation.silence.declaration import COST_MARGIN, DISTINCTIVENESS
-from semidense.stages.matching.declaration import COST_VOLUME, DESCRIPTOR_NET, MATCHING_NET, MATCHING_SAMPLES
+from semidense.stages.matching.declaration import COST_VOLUME, MATCHING_NET, MATCHING_SAMPLES
+from semidense.stages.matching.descriptors.declaration import DESCRIPTOR_NET
 from semidense.stages.metrics.ranking import RANKING
 from semidense.stages.metrics.stage import METRICS
 from semidense.stages.stage import Stage, StageError

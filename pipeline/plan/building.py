@@ -25,21 +25,20 @@ from semidense.pipeline.plan.steps import (
     Request,
     Step,
     code_of,
+    doubts,
     known_so_far,
     made_from,
-    named,
-    note_on,
+    notes,
     place,
     scope_of,
     without_truth,
 )
-from semidense.pipeline.plan.training_split import held_out_scenes, outside, spread, with_folds
+from semidense.pipeline.plan.training_split import held_out_scenes, outside, require_trainable, spread, with_folds
 from semidense.stages.catalog import STAGES
 from semidense.stages.compute.precision import resolve
 from semidense.stages.evaluation.calibration.declaration import CalibrationParams
 from semidense.stages.evaluation.filtering import SemidenseParams
 from semidense.stages.stage import Params, Stage
-from semidense.stages.transforms.declaration import ChannelsParams
 
 
 def build(request: Request) -> Graph:
@@ -49,7 +48,7 @@ def build(request: Request) -> Graph:
         UsageError: if there is nothing to do, or settings do not go together.
         StageError: if shipped weights are needed and there are none.
     """
-    graph = Graph(notes=[*request.notes, *_doubts(request.dataset.scenes)])
+    graph = Graph(notes=[*request.notes, *doubts(request.dataset.scenes)])
     trained_on = [scene.image_identity() for scene in request.training if request.leave_out]
     for variant, config in request.configs.items():
         builder = _Builder(graph, config, request)
@@ -59,15 +58,6 @@ def build(request: Request) -> Graph:
     if not graph.targets:
         raise UsageError(f"{request.dataset.spec}: no scene is left to work on; {'; '.join(graph.notes)}")
     return graph
-
-
-def _doubts(scenes: Sequence[SceneSource]) -> Iterator[str]:
-    """Yield each warning once, after the names of its scenes."""
-    found: dict[str, list[str]] = {}
-    for scene in scenes:
-        for warning in scene.warnings:
-            found.setdefault(warning, []).append(scene.name)
-    yield from (f"{named(names)}: {warning}" for warning, names in found.items())
 
 
 def _targets(builder: "_Builder", trained_on: Sequence[Mapping[str, Any]]) -> Iterator[str]:
@@ -93,24 +83,7 @@ def _targets(builder: "_Builder", trained_on: Sequence[Mapping[str, Any]]) -> It
             yield from (
                 builder.product(known_so_far(scene, each, unknown), scene) for each in (upto, *builder.request.also)
             )
-    builder.graph.notes += _notes(upto, trained, learnt, untold, unknown)
-
-
-def _notes(
-    upto: str, trained: Sequence[str], learnt: Sequence[str], untold: Sequence[str], unknown: Sequence[str]
-) -> Iterator[str]:
-    """Yield a note on the scenes of each kind: trained on, perhaps known to the weights, without truth, or range."""
-    is_, are = "is a training scene:", "are training scenes:"
-    left_out = "left out, since nothing is tested on"
-    yield from note_on(trained, f"{is_} it is {left_out} it", f"{are} they are {left_out} them")
-    known = "the package's weights may have learnt from"
-    yield from note_on(
-        learnt, f"{is_} {known} it, so its figures are no test", f"{are} {known} them, so their figures are no test"
-    )
-    lacks = f"no ground truth: no {upto} can be made for"
-    yield from note_on(untold, f"has {lacks} it", f"have {lacks} them")
-    open_ = "no known range of disparities: it is estimated first; a run shows what comes after `survey`"
-    yield from note_on(unknown, f"has {open_}", f"have {open_}")
+    builder.graph.notes += notes(upto, trained, learnt, untold, unknown)
 
 
 @dataclass
@@ -315,14 +288,3 @@ def _require_within(settings: Mapping[str, Any], scene: SceneSource) -> None:
     for name in ("d_min", "d_max"):
         if abs(value := settings.get(name) or 0) >= scene.size[1]:
             raise UsageError(f"{scene.name}: {name} is {value} px, but the image is only {scene.size[1]} px wide")
-
-
-def require_trainable(config: Config, product: str) -> None:
-    """Refuse to train with another light on the gray channel where there is none: it would fall on another channel.
-
-    Raises:
-        UsageError: if the product's ``relight`` is on and ``channels.use`` leaves gray out.
-    """
-    if getattr(config.section(product), "relight", 0) and "gray" not in config.of("channels", ChannelsParams).use:
-        told = f"{product}.relight changes the light of the gray channel, which channels.use leaves out"
-        raise UsageError(f"{told}: set {product}.relight=0")

@@ -4,7 +4,7 @@ A step is a product of one scene (or of the training split) with its settings. S
 share the steps in which they agree, so a sweep computes nothing twice. Nothing here looks at a cache.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import prod
 from typing import Any
@@ -236,3 +236,29 @@ def note_on(scenes: Sequence[str], one: str, several: str) -> list[str]:
     """
     names = list(dict.fromkeys(scenes))
     return [f"{named(names)} {one if len(names) == 1 else several}"] if names else []
+
+
+def doubts(scenes: Sequence[SceneSource]) -> Iterator[str]:
+    """Yield each warning once, after the names of its scenes."""
+    found: dict[str, list[str]] = {}
+    for scene in scenes:
+        for warning in scene.warnings:
+            found.setdefault(warning, []).append(scene.name)
+    yield from (f"{named(names)}: {warning}" for warning, names in found.items())
+
+
+def notes(
+    upto: str, trained: Sequence[str], learnt: Sequence[str], untold: Sequence[str], unknown: Sequence[str]
+) -> Iterator[str]:
+    """Yield a note on the scenes of each kind: trained on, perhaps known to the weights, without truth, or range."""
+    is_, are = "is a training scene:", "are training scenes:"
+    left_out = "left out, since nothing is tested on"
+    yield from note_on(trained, f"{is_} it is {left_out} it", f"{are} they are {left_out} them")
+    known = "the package's weights may have learnt from"
+    yield from note_on(
+        learnt, f"{is_} {known} it, so its figures are no test", f"{are} {known} them, so their figures are no test"
+    )
+    lacks = f"no ground truth: no {upto} can be made for"
+    yield from note_on(untold, f"has {lacks} it", f"have {lacks} them")
+    open_ = "no known range of disparities: it is estimated first; a run shows what comes after `survey`"
+    yield from note_on(unknown, f"has {open_}", f"have {open_}")

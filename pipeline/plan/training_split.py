@@ -11,6 +11,7 @@ from semidense.stages.evaluation.calibration.declaration import CalibrationParam
 from semidense.stages.evaluation.filtering import SemidenseParams
 from semidense.stages.learning.schedule import Schedule
 from semidense.stages.stage import Params
+from semidense.stages.transforms.declaration import ChannelsParams
 
 _Scene = TypeVar("_Scene")
 
@@ -133,3 +134,14 @@ def families(names: Sequence[str], fewest: int = 2) -> list[str]:
     """
     shared = [name.rstrip("0123456789") for name in names]
     return shared if len(set(shared)) >= fewest else list(names)
+
+
+def require_trainable(config: Config, product: str) -> None:
+    """Refuse to train with another light on the gray channel where there is none: it would fall on another channel.
+
+    Raises:
+        UsageError: if the product's ``relight`` is on and ``channels.use`` leaves gray out.
+    """
+    if getattr(config.section(product), "relight", 0) and "gray" not in config.of("channels", ChannelsParams).use:
+        told = f"{product}.relight changes the light of the gray channel, which channels.use leaves out"
+        raise UsageError(f"{told}: set {product}.relight=0")

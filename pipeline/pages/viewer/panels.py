@@ -1,6 +1,7 @@
 """The pictures and charts of the page: Bokeh's models, empty until a scene is chosen."""
 
 from dataclasses import dataclass
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -33,40 +34,13 @@ from semidense.pipeline.figures.colours import (
     disparity_colours,
 )
 
-LEGEND = """
-.scale, .key { white-space: nowrap; display: inline-flex; align-items: center; gap: .35rem; margin-right: .8rem; }
-.bar { display: inline-block; flex: none; height: .75rem; border-radius: .2rem; }
-.bar, .swatch { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
-.swatch { width: .8rem; height: .8rem; border: 1px solid var(--quiet); border-radius: .15rem; }
-:host { min-width: 0; max-width: 100%; overflow-x: auto; font: .82rem/1.4 system-ui, sans-serif; color: var(--quiet); }
-h3 { font-size: .95rem; margin: 0 0 .25rem; color: var(--ink); }
-.bk-clearfix { display: block !important; width: 100%; min-width: 0; }
-.fact { margin-right: 1.1rem; white-space: nowrap; }
-.fact b { color: var(--ink); font-size: .95rem; font-variant-numeric: tabular-nums; }
-.which { display: block; color: var(--ink); margin-top: .2rem; overflow-wrap: anywhere; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-caption { text-align: left; color: var(--quiet); }
-th, td { padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line); }
-.number { text-align: right; white-space: nowrap; } .scroll { overflow-x: auto; }
-.scroll { --edge: linear-gradient(var(--quiet), var(--quiet)) no-repeat scroll;
-  --cover: linear-gradient(var(--paper), var(--paper)) no-repeat local;
-  background: var(--cover) left / 2rem 100%, var(--cover) right / 2rem 100%,
-    var(--edge) left / 2px 100%, var(--edge) right / 2px 100%; } /* a line where more is hidden */
-pre { overflow-x: auto; background: var(--soft); padding: .6rem; }
-summary { cursor: pointer; color: var(--accent); }
-"""
-CONTROL = """
-:host { color: var(--ink); } label, .bk-slider-title { color: var(--ink); }
-.bk-input { background-color: var(--paper); color: var(--ink); border-color: var(--line); }
-select.bk-input:not([multiple]) {
-  background-image: conic-gradient(from -34deg at 50% 100%, var(--ink) 68deg, transparent 0);
-}
-.bk-spin-btn.bk-spin-btn-up:before { border-bottom-color: var(--ink); }
-.bk-spin-btn.bk-spin-btn-down:before { border-top-color: var(--ink); }
-.bk-btn, .bk-btn:hover { background-color: var(--soft); color: var(--ink); border-color: var(--line); }
-.bk-btn.bk-active { background-color: var(--accent); color: var(--paper); }
-.noUi-target { background: var(--soft); border-color: var(--line); box-shadow: none; }
-"""
+
+def _style(name: str) -> str:
+    return (files("semidense.pipeline.pages.viewer") / "page" / f"{name}.css").read_text(encoding="utf-8")
+
+
+LEGEND = _style("legend")
+CONTROL = _style("control")
 """A style: controls in the page's colours, light or dark."""
 WIDE = ":host { grid-column: var(--curve, span 2); } @media (max-width: 44rem) { :host { grid-column: auto; } }"
 """A style: the panel takes two columns of a grid of small maps, and a whole row of others."""

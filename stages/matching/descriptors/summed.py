@@ -18,7 +18,8 @@ from semidense.stages.disparity.declaration import AggregatedParams
 from semidense.stages.learning.augmentation import relight
 from semidense.stages.learning.scenes import Scenes
 from semidense.stages.matching.crops import Channels, cut, to_tensor
-from semidense.stages.matching.declaration import REACH, DescriptorNetParams, MatchingSamples, OfSummed
+from semidense.stages.matching.declaration import REACH, MatchingSamples
+from semidense.stages.matching.descriptors.declaration import DescriptorNetParams, OfSummed
 from semidense.stages.matching.descriptors.net import DescriptorNet
 from semidense.stages.matching.descriptors.transformed_training import describer
 from semidense.stages.matching.descriptors.volume import diagonals

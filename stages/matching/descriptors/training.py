@@ -16,7 +16,8 @@ from semidense.stages.learning.scenes import Scenes
 from semidense.stages.learning.schedule import SHARDS
 from semidense.stages.learning.training import fit
 from semidense.stages.matching.crops import Crop, cells_loss, cut_crop, measure_channels
-from semidense.stages.matching.declaration import REACH, DescriptorNetParams, MatchingSamples, OfSummed
+from semidense.stages.matching.declaration import REACH, MatchingSamples
+from semidense.stages.matching.descriptors.declaration import DescriptorNetParams, OfSummed
 from semidense.stages.matching.descriptors.net import DescriptorNet
 from semidense.stages.matching.descriptors.summed import cut_wide_crop, summed_loss, wide_scenes
 from semidense.stages.matching.descriptors.transformed_training import describer

@@ -5,7 +5,8 @@ import pytest
 import torch
 
 from semidense.stages.disparity.aggregation.levels import SCALE, levels_of
-from semidense.stages.matching.declaration import DescriptorNetParams, MatchingSamplesParams
+from semidense.stages.matching.declaration import MatchingSamplesParams
+from semidense.stages.matching.descriptors.declaration import DescriptorNetParams
 from semidense.stages.matching.descriptors.summed import crop_costs, cut_wide_crop, summed_loss, wide_scenes
 from semidense.stages.matching.descriptors.training import train_descriptor_net
 from semidense.stages.matching.descriptors.volume import fast_cost_volume

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from semidense.stages.matching.crops import cut_crop
-from semidense.stages.matching.declaration import DESCRIPTOR_NET, REACH, DescriptorNetParams, MatchingSamplesParams
+from semidense.stages.matching.declaration import REACH, MatchingSamplesParams
+from semidense.stages.matching.descriptors.declaration import DESCRIPTOR_NET, DescriptorNetParams
 from semidense.stages.matching.descriptors.net import descriptor_net_from_parameters
 from semidense.stages.matching.descriptors.training import crops_logits, train_descriptor_net
 from semidense.stages.matching.descriptors.volume import fast_cost_volume
