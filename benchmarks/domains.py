@@ -49,8 +49,8 @@ def main(
 ) -> None:
     """Print and write the figures of each data set."""
     tasks = [Task(spec, settings=setting or (), preset=preset, cache=cache) for spec in dataset]
-    for task in tasks:
-        _require_maps(_with_truth(task), pandora)
+    if pandora is not None:
+        _require_maps([scene for task in tasks for scene in _with_truth(task)], pandora)
     found = {str(task.dataset): _figures(task, pandora) for task in tasks}
     write("domains", {"preset": preset, "settings": setting or [], "datasets": found})
     others = ["SGBM"] if pandora is None else ["SGBM", "Pandora"]
@@ -98,11 +98,12 @@ def _with_truth(task: Task) -> list[SceneSource]:
     return [scene for scene in open_dataset(str(task.dataset)).scenes if scene.has_truth]
 
 
-def _require_maps(scenes: Sequence[SceneSource], pandora: Path | None) -> None:
+def _require_maps(scenes: Sequence[SceneSource], pandora: Path) -> None:
     """Refuse a folder that lacks a map, before anything is matched."""
-    for file in (file for scene in scenes if pandora for file in _files_of(pandora, scene.name)):
-        if not file.is_file():
-            raise typer.BadParameter(f"{file} is not there: make it by `python -m benchmarks.pandora`")
+    for scene in scenes:
+        for file in _files_of(pandora, scene.name):
+            if not file.is_file():
+                raise typer.BadParameter(f"{file} is not there: make it by `python -m benchmarks.pandora`")
 
 
 def _files_of(pandora: Path, scene: str) -> tuple[Path, Path]:

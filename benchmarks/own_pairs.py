@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 from typing import Annotated
@@ -68,7 +69,7 @@ def seconds_of_match(folder: Path, scenes: str) -> tuple[float, float]:
 
 
 def seconds_of_score(folder: Path) -> float:
-    """Return the wall time of scoring SGBM's map of the first pair."""
+    """Return the wall time of scoring the map of the first pair."""
     return seconds_of("score", folder / "left" / "a.png", folder / MAP, folder / "right" / "a.png")[0]
 
 
@@ -83,15 +84,20 @@ def seconds_of(*command: object) -> tuple[float, float]:
         return time.perf_counter() - begun, used
 
 
-def seconds_of_sgbm(folder: Path) -> float:
-    """Return the wall time of OpenCV's SGBM on the first pair, eight paths, one thread; write its map."""
+def sgbm_of(folder: Path) -> Callable[[], NDArray[np.float32]]:
+    """Return what matches the first pair by OpenCV's SGBM, along eight paths, on one thread."""
     import cv2
 
     cv2.setNumThreads(1)
     left, right = (to_gray(np.asarray(Image.open(folder / side / "a.png"))) for side in ("left", "right"))
     params = SgmParams(d_min=0, d_max=LAST)
-    write_pfm(folder / MAP, match_semi_global(left, right, params, checked=True))
-    return min(timed(lambda: match_semi_global(left, right, params, checked=True)) for _ in range(3))
+    return lambda: match_semi_global(left, right, params, checked=True)
+
+
+def seconds_of_sgbm(folder: Path) -> float:
+    """Return the wall time of SGBM on the first pair."""
+    sgbm = sgbm_of(folder)
+    return min(timed(sgbm) for _ in range(3))
 
 
 def seconds_of_pandora(python: Path, folder: Path) -> float:
@@ -145,7 +151,8 @@ def of_further_pairs(folder: Path, times: int) -> list[Ratio]:
 
 
 def of_score(folder: Path, times: int) -> Ratio:
-    """Return the seconds of scoring a map."""
+    """Return the seconds of scoring SGBM's map."""
+    write_pfm(folder / MAP, sgbm_of(folder)())
     taken = tuple(seconds_of_score(folder) for _ in range(times))
     return Ratio("scoring a map, cold, seconds", taken, SCORED, at_most=True)
 

@@ -108,7 +108,7 @@ class CostVolumeParams(Params):
 
     @property
     def transformed(self) -> bool:
-        """Whether it is transformed in float32 alone, which decides what ``precision=auto`` is."""
+        """Whether its convolutions are transformed in float32 alone, which decides what ``precision=auto`` is."""
         return self.mode == "fast"
 
     @property
