@@ -6,7 +6,7 @@ No pickle is ever read. A file that is not exactly a network of this package is 
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from semidense.stages.evaluation.evidence.foreign.declaration import FEATURES
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.parameters import count, from_vector, to_vector
-from semidense.stages.matching.descriptors.net import DescriptorNet
+from semidense.stages.matching.descriptors.net import descriptor_nets
 from semidense.stages.matching.net import HEADS, MatchingNet
 from semidense.stages.stage import Arrays, StageError
 
@@ -30,29 +30,30 @@ LOSS = "loss"
 """The tensor of a file that is no part of the network: float32 (step,)."""
 LARGEST = 64 * 2**20
 """Bytes; a larger file is refused before it is parsed."""
-MOST_CHANNELS = 3
+_CHANNELS = (3, 2, 1)
 
 
-def candidates(product: str) -> list[nn.Module]:
-    """Return every network that a product's parameters may belong to.
+def candidates(product: str) -> Iterator[nn.Module]:
+    """Yield every network that a product's parameters may belong to, the usual ones first.
 
     Raises:
         StageError: if the product is no network.
     """
     if product == "evaluation_net":
-        return [EvaluationNet()]
-    if product == "matching_net":
-        return [MatchingNet(channels, head) for head in HEADS for channels in range(1, MOST_CHANNELS + 1)]
-    if product == "descriptor_net":
-        return [DescriptorNet(channels) for channels in range(1, MOST_CHANNELS + 1)]
-    if product == "evidence_net":
-        return [EvidenceNet(len(NAMES))]
-    if product == "foreign_net":
-        return [EvidenceNet(len(FEATURES))]
-    raise StageError(
-        f"{product} is no network: weights are those of matching_net, descriptor_net, evaluation_net, evidence_net or "
-        "foreign_net"
-    )
+        yield EvaluationNet()
+    elif product == "matching_net":
+        yield from (MatchingNet(channels, head) for head in HEADS for channels in _CHANNELS)
+    elif product == "descriptor_net":
+        yield from (net for channels in _CHANNELS for net in descriptor_nets(channels))
+    elif product == "evidence_net":
+        yield EvidenceNet(len(NAMES))
+    elif product == "foreign_net":
+        yield EvidenceNet(len(FEATURES))
+    else:
+        raise StageError(
+            f"{product} is no network: weights are those of matching_net, descriptor_net, evaluation_net, "
+            "evidence_net or foreign_net"
+        )
 
 
 def save_weights(product: str, arrays: Arrays, metadata: Mapping[str, Any]) -> bytes:

@@ -1,7 +1,7 @@
 """What the descriptor-Net is made from, and what can be set. Light: it does not load torch."""
 
 from collections.abc import Sequence
-from typing import ClassVar, NotRequired
+from typing import ClassVar, Literal, NotRequired
 
 from pydantic import Field
 
@@ -9,6 +9,11 @@ from semidense.stages.compute.precision import Precision
 from semidense.stages.learning.schedule import SHARDS, Schedule
 from semidense.stages.matching.declaration import OfSamples
 from semidense.stages.stage import Images, Output, Stage, Truth
+
+Width = Literal[32, 64, 96, 128]
+"""Filters of a layer of the descriptor-Net, and numbers of a descriptor."""
+WIDTH: Width = 64
+"""The usual one."""
 
 
 class DescriptorNetParams(Schedule):
@@ -28,6 +33,7 @@ class DescriptorNetParams(Schedule):
         "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
     )
     seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
+    width: Width = Field(WIDTH, description="filters of a layer: 32, 64, 96 or 128; more err less and take longer")
     summed_steps: int = Field(
         0, ge=0, description="steps after these that learn from maps by costs summed along paths; 0: none"
     )

@@ -39,7 +39,8 @@ def train_descriptor_net(params: DescriptorNetParams, inputs: OfSummed, monitor:
     """
     products = by_scene(inputs["channels"], "channels")
     scenes = Scenes(lambda scene: products[scene]["channels"], len(products))
-    net = DescriptorNet(scenes[0].shape[1]).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    net = DescriptorNet(scenes[0].shape[1], params.width)
+    net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     initialise(net, params.seed)
     measure_channels(net, scenes)
     samples = inputs["matching_samples"]

@@ -3,9 +3,9 @@
 A kernel whose taps lie s px apart treats every s-th pixel of every s-th row as an image of its own; a tile is four
 rows and columns of such an image, and so are the pixels that it answers. From layer to layer
 
-    split      transform 6 x 6 tiles, s px between their pixels                  (36, tile, 64)
-    product    with the layer's transformed kernels                              (36, tile, 64)
-    merge      transform back, add the bias, cut at a floor                      (y, x, 64)
+    split      transform 6 x 6 tiles, s px between their pixels                  (36, tile, filter)
+    product    with the layer's transformed kernels                              (36, tile, filter)
+    merge      transform back, add the bias, cut at a floor                      (y, x, filter)
 
 for some tiles at a time, so that they stay in the processor's cache. A number's tiles lie side by side, as the product
 takes them: of another order it would make a copy first. The first layer has too few channels to gain.
@@ -14,6 +14,7 @@ All of it is float32.
 
 import math
 from collections.abc import Callable, Sequence
+from typing import get_args
 
 import numpy as np
 import torch
@@ -23,7 +24,8 @@ from torch.nn import functional
 
 from semidense.stages.compute.kernel import inlined, kernel
 from semidense.stages.matching.declaration import DILATIONS, REACH
-from semidense.stages.matching.descriptors.net import WIDTH, DescriptorNet
+from semidense.stages.matching.descriptors.declaration import Width
+from semidense.stages.matching.descriptors.net import DescriptorNet
 from semidense.stages.matching.winograd.storage import Flat
 from semidense.stages.matching.winograd.tiles import (
     TILE,
@@ -44,6 +46,8 @@ WHOLE = TILE * max(DILATIONS)
 """Rows and columns of descriptors are made up to a multiple of this: then every layer has whole tiles."""
 TILES = 96
 """Tiles that are transformed at once."""
+WIDEST = max(get_args(Width))
+"""Filters that a half transformed tile has room for, whatever it has: a loop is quicker with a fixed step."""
 
 Corner = tuple[int, int]
 Layer = Callable[[Tensor, Tensor, Tensor, float, int], Tensor]
@@ -73,18 +77,19 @@ def six_pixels(maps: NDArray[np.float32], y: int, x: int, step: int) -> Six[NDAr
 
 @kernel
 def split(maps: NDArray[np.float32], first: int, count: int, step: int, tiles: NDArray[np.float32]) -> None:
-    """Transform ``count`` tiles of maps (y, x, WIDTH) from tile ``first`` on, into (36, tile, WIDTH)."""
-    row = 6 * WIDTH
+    """Transform ``count`` tiles of maps (y, x, filter) from tile ``first`` on, into (36, tile, filter)."""
+    width = maps.shape[2]
+    row = 6 * WIDEST
     part = np.empty(6 * row, np.float32)  # one tile, transformed along its rows
     for tile in range(count):
         y, x = corner(first + tile, step, maps.shape[1] - 2 * step)
         for k in range(6):
             pixels, line = six_pixels(maps, y + k * step, x, step), part[k * row : (k + 1) * row]
-            for c in range(WIDTH):
-                store6(line, WIDTH, c, forward6(pick6(pixels, c)))
+            for c in range(width):
+                store6(line, WIDEST, c, forward6(pick6(pixels, c)))
         for j in range(6):
-            column, out = part[j * WIDTH :], gather6(tiles, j, tile)
-            for c in range(WIDTH):
+            column, out = part[j * WIDEST :], gather6(tiles, j, tile)
+            for c in range(width):
                 place6(out, c, forward6(load6(column, row, c)))
 
 
@@ -92,21 +97,22 @@ def split(maps: NDArray[np.float32], first: int, count: int, step: int, tiles: N
 def merge(
     products: NDArray[np.float32], bias: Flat, floor: np.float32, first: int, step: int, maps: NDArray[np.float32]
 ) -> None:
-    """Transform products (36, tile, WIDTH) back, add the bias, cut at the floor, into maps (y, x, WIDTH)."""
-    row = 6 * WIDTH
+    """Transform products (36, tile, filter) back, add the bias, cut at the floor, into maps (y, x, filter)."""
+    width = maps.shape[2]
+    row = 6 * WIDEST
     part = np.empty(TILE * row, np.float32)
     for tile in range(products.shape[1]):
         for j in range(6):
-            numbers, column = gather6(products, j, tile), part[j * WIDTH :]
-            for c in range(WIDTH):
+            numbers, column = gather6(products, j, tile), part[j * WIDEST :]
+            for c in range(width):
                 store4(column, row, c, inverse6(pick6(numbers, c)))
         y, x = corner(first + tile, step, maps.shape[1])
         for k in range(TILE):
             line, below = part[k * row : (k + 1) * row], y + k * step
             one, two = maps[below, x], maps[below, x + step]
             three, four = maps[below, x + 2 * step], maps[below, x + 3 * step]
-            for c in range(WIDTH):
-                one[c], two[c], three[c], four[c] = _floored(inverse6(load6(line, WIDTH, c)), bias[c], floor)
+            for c in range(width):
+                one[c], two[c], three[c], four[c] = _floored(inverse6(load6(line, WIDEST, c)), bias[c], floor)
 
 
 @inlined
@@ -120,23 +126,24 @@ def kernels_of(net: DescriptorNet) -> list[Tensor]:
 
 
 def convolved(maps: Tensor, weight: Tensor, bias: Tensor, floor: float, step: int) -> Tensor:
-    """Return what a layer makes of maps, cut at a floor: (y + 2 step, x + 2 step, 64) -> (y, x, 64).
+    """Return what a layer makes of maps, cut at a floor: (y + 2 step, x + 2 step, filter) -> (y, x, filter).
 
     Args:
         maps: float32, contiguous; y and x multiples of 4 step.
-        weight: (36, 64, 64), the transformed kernels.
-        bias: (64,).
+        weight: (36, filter, filter), the transformed kernels.
+        bias: (filter,).
         floor: 0 for a ReLU, minus infinity for none.
         step: distance of the kernels' taps, px.
     """
-    made = torch.empty(maps.shape[0] - 2 * step, maps.shape[1] - 2 * step, WIDTH)
+    width = maps.shape[2]
+    made = torch.empty(maps.shape[0] - 2 * step, maps.shape[1] - 2 * step, width)
     total = made.shape[0] * made.shape[1] // TILE**2
-    tiles = torch.empty(36, TILES, WIDTH)
-    products = torch.empty(36 * TILES * WIDTH)
+    tiles = torch.empty(36, TILES, width)
+    products = torch.empty(36 * TILES * width)
     for first in range(0, total, TILES):
         count = min(TILES, total - first)
         split(maps.numpy(), first, count, step, tiles.numpy())
-        answers = products[: 36 * count * WIDTH].view(36, count, WIDTH)
+        answers = products[: 36 * count * width].view(36, count, width)
         torch.bmm(tiles[:, :count], weight, out=answers)
         merge(answers.numpy(), bias.numpy(), np.float32(floor), first, step, made.numpy())
     return made
@@ -154,7 +161,7 @@ def transformed_descriptors(
         layer: ``convolved``, or one that gradients flow through.
 
     Returns:
-        float32 (y, x, 64), of unit length.
+        float32 (y, x, filter), of unit length.
     """
     height, width = (length - 2 * REACH for length in view.shape[1:])
     made_up = functional.pad(view[None], (0, -width % WHOLE, 0, -height % WHOLE))

@@ -13,9 +13,10 @@ from torch import Tensor
 
 from semidense.stages.compute.kernel import inlined, kernel
 from semidense.stages.compute.precision import Precision
-from semidense.stages.matching.descriptors.net import WIDTH, DescriptorNet
+from semidense.stages.matching.descriptors.net import DescriptorNet
 from semidense.stages.matching.descriptors.transformed import (
     TILES,
+    WIDEST,
     convolved,
     corner,
     kernels_of,
@@ -39,19 +40,21 @@ from semidense.stages.matching.winograd.tiles import (
 
 @kernel
 def _merge_transposed(gradient: NDArray[np.float32], first: int, count: int, step: int, products: Flat) -> None:
-    """Carry the gradient of a layer's answers (y, x, WIDTH) to its products (tile, 36, WIDTH)."""
-    row = 6 * WIDTH
+    """Carry the gradient of a layer's answers (y, x, filter) to its products (tile, 36, filter)."""
+    width = gradient.shape[2]
+    row = 6 * WIDEST
     part = np.empty(TILE * row, np.float32)
     for tile in range(count):
         y, x = corner(first + tile, step, gradient.shape[1])
         for k in range(TILE):
             pixels, line = _four_pixels(gradient, y + k * step, x, step), part[k * row : (k + 1) * row]
-            for c in range(WIDTH):
+            for c in range(width):
                 four = pixels[0][c], pixels[1][c], pixels[2][c], pixels[3][c]
-                store6(line, WIDTH, c, inverse6_transposed(four))
-        out = products[tile * 6 * row : (tile + 1) * 6 * row]
-        for c in range(row):
-            store6(out, row, c, inverse6_transposed(load4(part, row, c)))
+                store6(line, WIDEST, c, inverse6_transposed(four))
+        for j in range(6):
+            column, out = part[j * WIDEST :], products[(tile * 36 + j) * width :]
+            for c in range(width):
+                store6(out, 6 * width, c, inverse6_transposed(load4(column, row, c)))
 
 
 @inlined
@@ -62,19 +65,20 @@ def _four_pixels(maps: NDArray[np.float32], y: int, x: int, step: int) -> Four[F
 
 @kernel
 def _split_transposed(tiles: NDArray[np.float32], first: int, step: int, gradient: NDArray[np.float32]) -> None:
-    """Add up the gradients of tiles (36, tile, WIDTH) in that of a layer's maps (y, x, WIDTH)."""
-    row = 6 * WIDTH
+    """Add up the gradients of tiles (36, tile, filter) in that of a layer's maps (y, x, filter)."""
+    width = tiles.shape[2]
+    row = 6 * WIDEST
     part = np.empty(6 * row, np.float32)
     for tile in range(tiles.shape[1]):
         for j in range(6):
-            numbers, column = gather6(tiles, j, tile), part[j * WIDTH :]
-            for c in range(WIDTH):
+            numbers, column = gather6(tiles, j, tile), part[j * WIDEST :]
+            for c in range(width):
                 store6(column, row, c, forward6_transposed(pick6(numbers, c)))
         y, x = corner(first + tile, step, gradient.shape[1] - 2 * step)
         for k in range(6):
             line, pixels = part[k * row : (k + 1) * row], six_pixels(gradient, y + k * step, x, step)
-            for c in range(WIDTH):
-                six = forward6_transposed(load6(line, WIDTH, c))
+            for c in range(width):
+                six = forward6_transposed(load6(line, WIDEST, c))
                 pixels[0][c] += six[0]
                 pixels[1][c] += six[1]
                 pixels[2][c] += six[2]
@@ -84,7 +88,7 @@ def _split_transposed(tiles: NDArray[np.float32], first: int, step: int, gradien
 
 
 def describer(net: DescriptorNet, precision: Precision) -> Callable[[Tensor], Tensor]:
-    """Return what gives a view (1, channel, y + 16, x + 16) its descriptors (y, x, 64) in training, differentiable."""
+    """Return what gives a view (1, channel, y + 16, x + 16) its descriptors (y, x, filter), differentiable."""
     if precision != "float32":
         return lambda view: net(view)[0].permute(1, 2, 0)
     kernels = kernels_of(net)
@@ -111,7 +115,8 @@ class _Convolved(torch.autograd.Function):
         given = (given * (made > ctx.floor)).contiguous()
         maps_gradient, weight_gradient = torch.zeros_like(maps), torch.zeros_like(weight)
         total = made.shape[0] * made.shape[1] // TILE**2
-        tiles, products = torch.empty(36, TILES, WIDTH), torch.empty(TILES, 36, WIDTH)
+        width = maps.shape[2]
+        tiles, products = torch.empty(36, TILES, width), torch.empty(TILES, 36, width)
         for first in range(0, total, TILES):
             count = min(TILES, total - first)
             split(maps.numpy(), first, count, ctx.step, tiles.numpy())

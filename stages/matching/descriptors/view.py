@@ -13,7 +13,7 @@ from torch.nn import functional
 
 from semidense.stages.compute.precision import Precision, dtype_of
 from semidense.stages.matching.declaration import REACH
-from semidense.stages.matching.descriptors.net import WIDTH, DescriptorNet
+from semidense.stages.matching.descriptors.net import DescriptorNet
 from semidense.stages.matching.descriptors.transformed import kernels_of, transformed_descriptors
 
 ROWS = 64
@@ -29,7 +29,7 @@ def described_views(net: DescriptorNet, views: NDArray[np.float32], precision: P
         precision: arithmetic of the convolutions.
 
     Returns:
-        For each view (y, x, 64) float32, of unit length.
+        For each view (y, x, filter) float32, of unit length.
     """
     tensors = torch.from_numpy(np.ascontiguousarray(views))
     if dtype_of(precision) == torch.bfloat16:
@@ -42,7 +42,7 @@ def _plain(net: DescriptorNet, view: Tensor) -> Tensor:
     """Return the descriptors of a view by plain convolutions in bfloat16; a row does not depend on the others."""
     height, width = (length - 2 * REACH for length in view.shape[1:])
     layers = [(layer.weight.bfloat16(), layer.bias.bfloat16(), layer.dilation) for layer in [*net.hidden, net.out]]
-    made = torch.empty(height, width, WIDTH)
+    made = torch.empty(height, width, net.width)
     for first in range(0, height, ROWS):
         maps = net.normalised(view[None, :, first : first + ROWS + 2 * REACH])
         maps = maps.bfloat16().contiguous(memory_format=torch.channels_last)

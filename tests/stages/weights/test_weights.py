@@ -16,6 +16,7 @@ from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.net import EvaluationNet
 from semidense.stages.learning.parameters import count, to_vector
 from semidense.stages.matching.declaration import Head
+from semidense.stages.matching.descriptors.declaration import Width
 from semidense.stages.matching.descriptors.net import DescriptorNet
 from semidense.stages.matching.net import MatchingNet
 from semidense.stages.stage import StageError
@@ -45,9 +46,9 @@ def test_the_round_trip_of_a_matching_net_is_exact(channels: int, head: Head) ->
     assert np.array_equal(again["parameters"], vector) and np.array_equal(again["loss"], LOSS)
 
 
-@pytest.mark.parametrize("channels", [1, 2, 3])
-def test_the_round_trip_of_a_descriptor_net_is_exact(channels: int) -> None:
-    vector = np.random.default_rng(0).normal(size=count(DescriptorNet(channels))).astype(np.float32)
+@pytest.mark.parametrize(("channels", "width"), [(1, 64), (2, 64), (3, 64), (3, 96)])
+def test_the_round_trip_of_a_descriptor_net_is_exact(channels: int, width: Width) -> None:
+    vector = np.random.default_rng(0).normal(size=count(DescriptorNet(channels, width))).astype(np.float32)
     data = save_weights("descriptor_net", {"parameters": vector, "loss": LOSS}, {})
     assert np.array_equal(read_weights("descriptor_net", data)["parameters"], vector)
 
@@ -70,9 +71,10 @@ def test_the_round_trip_of_a_foreign_net_is_exact() -> None:
     assert np.array_equal(read_weights("foreign_net", data)["parameters"], vector)
 
 
-def test_the_number_of_parameters_tells_the_network() -> None:
-    numbers = [count(net) for net in candidates("matching_net")]
-    assert len(set(numbers)) == len(numbers) == 6
+@pytest.mark.parametrize(("product", "networks"), [("matching_net", 6), ("descriptor_net", 12)])
+def test_the_number_of_parameters_tells_the_network(product: str, networks: int) -> None:
+    numbers = [count(net) for net in candidates(product)]
+    assert len(set(numbers)) == len(numbers) == networks
 
 
 def test_the_file_says_what_it_is_and_how_it_was_made(tmp_path: pytest.TempPathFactory) -> None:

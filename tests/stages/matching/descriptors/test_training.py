@@ -62,6 +62,14 @@ def test_makes_what_it_declares_and_one_seed_makes_it_again() -> None:
     assert len(one["loss"]) == 4
 
 
+def test_more_filters_make_a_larger_network_that_the_volume_takes() -> None:
+    scene = inputs(shifted_scene())
+    made = train_descriptor_net(settings(width=96), scene)
+    net = descriptor_net_from_parameters(made["parameters"], 3)
+    assert net.width == 96
+    assert fast_cost_volume(net, shifted_scene()["channels"]["channels"], range(4)).shape[2] == 4
+
+
 def of_two_scenes(samples: int) -> dict[str, object]:
     both = [shifted_scene(seed=seed) for seed in (0, 1)]
     params = MatchingSamplesParams(samples=samples, height=5, width=8, slots=4)

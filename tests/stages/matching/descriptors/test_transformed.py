@@ -4,6 +4,7 @@ import torch
 from semidense.stages.matching.declaration import DILATIONS, REACH
 from semidense.stages.matching.descriptors import transformed as module
 from semidense.stages.matching.descriptors import transformed_training as training
+from semidense.stages.matching.descriptors.declaration import WIDTH, Width
 from semidense.stages.matching.descriptors.net import DescriptorNet
 from semidense.stages.matching.descriptors.transformed import WHOLE, kernels_of, transformed_descriptors
 from semidense.stages.matching.descriptors.transformed_training import differentiable
@@ -19,15 +20,16 @@ from tests.stages.matching.descriptors.test_volume import random_descriptor_net
         pytest.param(21, 38, id="no multiple of anything"),
     ],
 )
+@pytest.mark.parametrize("filters", [32, WIDTH, 96])
 @pytest.mark.parametrize("tiles", [pytest.param(5, id="few at once"), pytest.param(module.TILES, id="as it is")])
 def test_the_descriptors_are_those_of_plain_convolutions(
-    height: int, width: int, tiles: int, monkeypatch: pytest.MonkeyPatch
+    height: int, width: int, tiles: int, filters: Width, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "TILES", tiles)
-    net = random_descriptor_net()
+    net = random_descriptor_net(width=filters)
     view = torch.randn(3, height + 2 * REACH, width + 2 * REACH, generator=torch.Generator().manual_seed(0))
     made, expected = transformed_descriptors(net, kernels_of(net), view), net(view[None])[0].permute(1, 2, 0)
-    assert made.shape == (height, width, 64)
+    assert made.shape == (height, width, filters)
     assert torch.allclose(made, expected, atol=2e-6)
 
 
@@ -48,6 +50,7 @@ def test_every_layer_has_whole_tiles() -> None:
     assert length == WHOLE
 
 
+@pytest.mark.parametrize("filters", [32, WIDTH, 96])
 @pytest.mark.parametrize(
     ("tiles", "lift", "bound"),
     [
@@ -57,17 +60,17 @@ def test_every_layer_has_whole_tiles() -> None:
     ],
 )
 def test_the_gradients_are_those_of_plain_convolutions(
-    tiles: int, lift: float, bound: float, monkeypatch: pytest.MonkeyPatch
+    tiles: int, lift: float, bound: float, filters: Width, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "TILES", tiles)
     monkeypatch.setattr(training, "TILES", tiles)
-    net = random_descriptor_net()
+    net = random_descriptor_net(width=filters)
     for layer in net.hidden:
         layer.bias += lift
     net.requires_grad_()
     generator = torch.Generator().manual_seed(0)
     view = torch.randn(3, 21 + 2 * REACH, 38 + 2 * REACH, generator=generator, requires_grad=True)
-    wanted = torch.randn(21, 38, 64, generator=generator)
+    wanted = torch.randn(21, 38, filters, generator=generator)
     made, expected = (
         torch.autograd.grad((descriptors * wanted).sum(), [view, *described_by(net)])
         for descriptors in (

@@ -4,6 +4,7 @@ import torch
 
 from semidense.stages.matching.declaration import REACH
 from semidense.stages.matching.descriptors import view as module
+from semidense.stages.matching.descriptors.declaration import WIDTH, Width
 from semidense.stages.matching.descriptors.view import described_views
 from tests.stages.matching.descriptors.test_volume import random_descriptor_net
 
@@ -21,14 +22,15 @@ def padded_views(height: int, width: int) -> np.ndarray:
     ],
 )
 @pytest.mark.parametrize(("height", "width"), [(1, 1), (21, 38)])
+@pytest.mark.parametrize("filters", [WIDTH, 128])
 def test_the_descriptors_are_those_of_the_network(
-    precision: module.Precision, bound: float, height: int, width: int
+    precision: module.Precision, bound: float, height: int, width: int, filters: Width
 ) -> None:
-    net, views = random_descriptor_net(), padded_views(height, width)
+    net, views = random_descriptor_net(width=filters), padded_views(height, width)
     with torch.inference_mode():
         made, expected = described_views(net, views, precision), net(torch.from_numpy(views)).permute(0, 2, 3, 1)
     for one, other in zip(made, expected, strict=True):
-        assert one.dtype == torch.float32 and one.shape == (height, width, 64)
+        assert one.dtype == torch.float32 and one.shape == (height, width, filters)
         assert torch.allclose(one, other, atol=bound)
         assert torch.allclose(one.norm(dim=2), torch.ones(height, width), atol=1e-5)
 

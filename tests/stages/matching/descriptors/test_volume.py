@@ -1,3 +1,5 @@
+from typing import get_args
+
 import numpy as np
 import pytest
 import torch
@@ -8,6 +10,7 @@ from semidense.stages.compute.precision import Precision
 from semidense.stages.learning.parameters import initialise, to_vector
 from semidense.stages.matching.declaration import CHUNK, COST_VOLUME, DILATIONS, REACH, CostVolumeParams
 from semidense.stages.matching.descriptors import volume as module
+from semidense.stages.matching.descriptors.declaration import WIDTH, Width
 from semidense.stages.matching.descriptors.net import DescriptorNet, descriptor_net_from_parameters
 from semidense.stages.matching.descriptors.volume import diagonals, fast_cost_volume
 from semidense.stages.stage import StageError
@@ -17,9 +20,9 @@ from tests.stages.tiling import tiled, whole
 DIMS = {"channels": {"channels": ("view", "channel", "y", "x")}, "descriptor_net": {"parameters": ("parameter",)}}
 
 
-def random_descriptor_net(channels: int = 3) -> DescriptorNet:
+def random_descriptor_net(channels: int = 3, width: Width = WIDTH) -> DescriptorNet:
     """Return a network with nothing at zero."""
-    net = DescriptorNet(channels)
+    net = DescriptorNet(channels, width)
     initialise(net, 0)
     generator = torch.Generator().manual_seed(1)
     with torch.no_grad():
@@ -146,9 +149,12 @@ def test_refuses_other_shapes(shape: tuple[int, ...], message: str) -> None:
         fast_cost_volume(random_descriptor_net(), np.zeros(shape, np.float32), range(3))
 
 
-def test_parameters_make_the_net_again_for_the_same_channels_only() -> None:
-    vector = to_vector(random_descriptor_net(2))
-    assert np.array_equal(to_vector(descriptor_net_from_parameters(vector, 2)), vector)
+@pytest.mark.parametrize("width", get_args(Width))
+def test_parameters_make_the_net_again_for_the_same_channels_only(width: Width) -> None:
+    vector = to_vector(random_descriptor_net(2, width))
+    made = descriptor_net_from_parameters(vector, 2)
+    assert made.width == width
+    assert np.array_equal(to_vector(made), vector)
     with pytest.raises(StageError, match=r"do not fit 3 channel\(s\) a view: it was trained on other channels"):
         descriptor_net_from_parameters(vector, 3)
     with pytest.raises(StageError, match="at least one channel, got 0"):
