@@ -116,7 +116,14 @@ class _Builder:
 
     def held_out(self, product: str) -> Iterator[str]:
         """Add a product of each training scene that was asked for, made by networks that have not seen it."""
-        for scene in held_out_scenes(self.config, self.request.dataset, self._mapped() if self.request.train else ()):
+        dataset = self.request.dataset
+        judged = held_out_scenes(self.config, dataset, self._mapped() if self.request.train else ())
+        if len(judged) < len(dataset.scenes):
+            self.graph.notes.append(
+                f"training.held_out judges {len(judged)} of {len(dataset.scenes)} scenes: those that the confidence "
+                "learns from (training.maps says how many of each data set)"
+            )
+        for scene in judged:
             yield self._not_having_seen(scene).product(product, scene)
 
     def _add_product(self, product: str, scene: SceneSource | None) -> str:

@@ -168,6 +168,7 @@ def test_held_out_scenes_are_those_whose_maps_are_learnt_from_and_that_were_aske
     asked = many.select(["train-1", "train-2", "test-0"])
     made = build(Request(asked, {"": config}, "disparity", True, training_scenes(many)))
     assert [made.steps[target].scene for target, _ in made.targets] == ["train-1"]
+    assert [note for note in made.notes if "training.held_out judges 1 of 3 scenes" in note]
 
 
 @pytest.mark.parametrize(
