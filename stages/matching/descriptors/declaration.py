@@ -13,7 +13,7 @@ from semidense.stages.stage import Images, Output, Stage, Truth
 Width = Literal[32, 64, 96, 128]
 """Filters of a layer of the descriptor-Net, and numbers of a descriptor."""
 WIDTH: Width = 64
-"""The usual one."""
+"""That of the weights that come with the package."""
 
 
 class DescriptorNetParams(Schedule):
@@ -33,7 +33,9 @@ class DescriptorNetParams(Schedule):
         "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
     )
     seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
-    width: Width = Field(WIDTH, description="filters of a layer: 32, 64, 96 or 128; more err less and take longer")
+    width: Width = Field(
+        WIDTH, description="filters of a layer where the network is trained: 32, 64, 96 or 128; more take longer"
+    )
     summed_steps: int = Field(
         0, ge=0, description="steps after these that learn from maps by costs summed along paths; 0: none"
     )
