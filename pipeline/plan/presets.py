@@ -15,6 +15,7 @@ PRESETS: Mapping[str, tuple[str, ...]] = {
         "training.cross_fit=true",
         "training.maps=24",
         "matching_samples.dense_share=0.5",
+        "descriptor_net.width=96",
         "descriptor_net.steps=5000",
         "descriptor_net.summed_steps=1000",
         "evaluation_net.steps=800",

@@ -13,7 +13,7 @@ from semidense.stages.stage import Images, Output, Stage, Truth
 Width = Literal[32, 64, 96, 128]
 """Filters of a layer of the descriptor-Net, and numbers of a descriptor."""
 WIDTH: Width = 64
-"""That of the weights that come with the package."""
+"""That of the indoor weights that come with the package; the general ones have 96."""
 
 
 class DescriptorNetParams(Schedule):
