@@ -47,8 +47,10 @@ def _plain(net: DescriptorNet, view: Tensor) -> Tensor:
         maps = net.normalised(view[None, :, first : first + ROWS + 2 * REACH])
         maps = maps.bfloat16().contiguous(memory_format=torch.channels_last)
         for weight, bias, step in layers[:-1]:
-            maps = functional.conv2d(maps, weight, bias, dilation=step).relu_()
+            maps = functional.conv2d(maps, weight, bias, dilation=step)
+            maps.view(torch.int16).clamp_min_(0)  # the ReLU, by the sign bit: torch's own takes as long as a layer
         weight, bias, step = layers[-1]
         out = functional.conv2d(maps, weight, bias, dilation=step)[0].permute(1, 2, 0).float()
-        made[first : first + ROWS] = functional.normalize(out, dim=2)
+        length = torch.linalg.vector_norm(out, dim=2, keepdim=True).clamp_min(1e-12)
+        torch.div(out, length, out=made[first : first + ROWS])
     return made
