@@ -29,7 +29,7 @@ CHUNK = 32
 NUMBERS = 1 << 25
 """Most numbers of a fast volume's tile that has more than one chunk: 128 MB."""
 _BESIDE = 4 * 96
-"""Numbers a pixel beside its costs: the descriptors of both views, and two layers on the way to one of them, 96 each."""
+"""Numbers a pixel beside its costs: 96 each for the descriptors of both views and for two layers on the way to one."""
 
 
 class MatchingSamplesParams(Params):
