@@ -26,8 +26,8 @@ MARGIN = 4 + REACH
 """Pixels around a tile that propose to it in a guided volume, and what their descriptors see."""
 CHUNK = 32
 """Rows of a chunk of the volume."""
-NUMBERS = 1 << 25
-"""Most numbers of a fast volume's tile that has more than one chunk: 128 MB."""
+NUMBERS = 3 << 24
+"""Most numbers of a fast volume's tile that has more than one chunk: 192 MB."""
 _BESIDE = 4 * 96
 """Numbers a pixel beside its costs: 96 each for the descriptors of both views and for two layers on the way to one."""
 
