@@ -51,6 +51,5 @@ def _plain(net: DescriptorNet, view: Tensor) -> Tensor:
             maps.view(torch.int16).clamp_min_(0)  # the ReLU, by the sign bit: torch's own takes as long as a layer
         weight, bias, step = layers[-1]
         out = functional.conv2d(maps, weight, bias, dilation=step)[0].permute(1, 2, 0).float()
-        length = torch.linalg.vector_norm(out, dim=2, keepdim=True).clamp_min(1e-12)
-        torch.div(out, length, out=made[first : first + ROWS])
+        functional.normalize(out, dim=2, out=made[first : first + ROWS])
     return made
