@@ -47,15 +47,17 @@ class AggregatedParams(Params):
 
     paths: Literal[8, 16] = Field(8, description="directions that costs are summed along")
     p1: float = Field(
-        24, ge=0, le=400, description="penalty of a step of 1 px along a path, log-odds; larger: smoother surfaces"
+        110, ge=0, le=900, description="penalty of a step of 1 px along a path, log-odds; larger: smoother surfaces"
+    )
+    oblique: float = Field(
+        0.25, ge=0, le=1, description="share of p1 along paths that are neither row nor column: these follow slopes"
     )
     p2: float = Field(
-        192, ge=0, le=400, description="penalty of a larger step, log-odds; larger: fewer jumps and fewer small objects"
+        900, ge=0, le=900, description="penalty of a larger step, log-odds; larger: fewer jumps and fewer small objects"
     )
-    edge_step: int = Field(
-        6, ge=0, le=255, description="pixels whose gray differs by more levels of 255 have an edge between them"
+    edge: float = Field(
+        1.5, gt=0, le=100_000, description="the penalties are halved where the smoothed gray differs by so much, of 255"
     )
-    edge_divisor: float = Field(8, ge=1, le=1000, description="both penalties are divided by it at an edge")
     passes: Literal[1, 2] = Field(
         1, description="2: add the mean of the first path costs to the cost of each cell, and sum once more"
     )

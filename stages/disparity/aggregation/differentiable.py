@@ -14,27 +14,29 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.disparity.aggregation.paths import is_edge, steps_down
-from semidense.stages.disparity.declaration import AggregatedParams
+from semidense.stages.disparity.aggregation.edges import difference, is_oblique
+from semidense.stages.disparity.aggregation.paths import DOWN
 
+STEPS = np.concatenate([DOWN[:4], -DOWN[:4]])
+"""Steps (rows, columns) of the eight paths."""
 BEYOND = np.float32(1e9)
 """Stands for the cost beyond both ends of the range."""
 SAME, FROM_BELOW, FROM_ABOVE, JUMP, BEGIN = range(5)
 """Ways to come to a cell: from the same disparity, one less, one more, the least of any, or where a path begins."""
 
 
-def path_sums(costs: Tensor, gray: NDArray[np.uint8], params: AggregatedParams) -> Tensor:
+def path_sums(costs: Tensor, gray: NDArray[np.uint8], penalties: NDArray[np.float32]) -> Tensor:
     """Return the costs summed along the paths, differentiable with respect to the costs.
 
     Args:
         costs: float32 (y, x, d), finite.
         gray: (y, x) uint8 of the same view: penalties are smaller across its edges.
-        params: paths and penalties.
+        penalties: (straight or oblique, difference of gray 0 to 255, P1 or P2) float32, in units of the costs.
 
     Returns:
         float32 (y, x, d), in units of the costs: of each cell the sum over all paths.
     """
-    sums: Tensor = _PathSums.apply(costs.contiguous(), np.ascontiguousarray(gray), params)  # type: ignore[no-untyped-call]
+    sums: Tensor = _PathSums.apply(costs.contiguous(), np.ascontiguousarray(gray), penalties)  # type: ignore[no-untyped-call]
     return sums
 
 
@@ -42,23 +44,19 @@ class _PathSums(torch.autograd.Function):
     """The sums, and how a gradient goes back from them to the costs."""
 
     @staticmethod
-    def forward(ctx: Any, costs: Tensor, gray: NDArray[np.uint8], params: AggregatedParams) -> Tensor:  # noqa: ANN401
-        down = steps_down(params)
-        steps = np.concatenate([down, -down])
-        plain = np.array([params.p1, params.p2], np.float32)
-        table = np.stack([plain, plain / np.float32(params.edge_divisor)])
-        ways = np.empty((len(steps), *costs.shape), np.int8)
+    def forward(ctx: Any, costs: Tensor, gray: NDArray[np.uint8], table: NDArray[np.float32]) -> Tensor:  # noqa: ANN401
+        ways = np.empty((len(STEPS), *costs.shape), np.int8)
         least = np.empty(ways.shape[:3], np.int32)
         sums = np.zeros(costs.shape, np.float32)
-        _sum(costs.numpy(), gray, steps, table, params.edge_step, ways, least, sums)
-        ctx.followed = steps, ways, least
+        _sum(costs.numpy(), gray, STEPS, table, ways, least, sums)
+        ctx.followed = ways, least
         return torch.from_numpy(sums)
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None]:  # noqa: ANN401
-        steps, ways, least = ctx.followed
+        ways, least = ctx.followed
         costs = np.zeros(gradient.shape, np.float32)
-        _return(gradient.contiguous().numpy(), steps, ways, least, costs)
+        _return(gradient.contiguous().numpy(), STEPS, ways, least, costs)
         return torch.from_numpy(costs), None, None
 
 
@@ -74,8 +72,7 @@ def _sum(
     costs: NDArray[np.float32],
     gray: NDArray[np.uint8],
     steps: NDArray[np.int64],
-    table: NDArray[np.float32],
-    edge_step: int,
+    penalties: NDArray[np.float32],
     ways: NDArray[np.int8],
     least: NDArray[np.int32],
     sums: NDArray[np.float32],
@@ -84,14 +81,15 @@ def _sum(
     height, width, depth = costs.shape
     path = np.full((height, width, depth + 2), BEYOND, np.float32)
     for p in range(len(steps)):
+        table = penalties[is_oblique(steps[p, 0], steps[p, 1])]
         for row in range(height):
             for column in range(width):
                 y, x = _order(steps[p], row, height, 0), _order(steps[p], column, width, 1)
                 v, u = y - steps[p, 0], x - steps[p, 1]
                 if 0 <= v < height and 0 <= u < width:
-                    edge = is_edge(gray, y, x, v, u, edge_step)
+                    change = difference(gray, y, x, v, u)
                     low = path[v, u, least[p, v, u] + 1]
-                    _extend(path[v, u], low, table[edge, 0], table[edge, 1], costs[y, x], path[y, x], ways[p, y, x])
+                    _extend(path[v, u], low, table[change, 0], table[change, 1], costs[y, x], path[y, x], ways[p, y, x])
                 else:
                     path[y, x, 1:-1] = costs[y, x]
                     ways[p, y, x] = BEGIN

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from semidense.stages.compute.kernel import kernel
 from semidense.stages.stage import StageError, require_shape
 
-SCALE = 8
+SCALE = 4
 """Levels of one unit of cost. Both kinds of volume store log-odds, so one scale and one set of penalties fit all."""
 CAP = 40 * SCALE
 """Largest cost above the pixel's least, levels. Log-odds of trained networks differ by less than 40."""

@@ -2,8 +2,9 @@
 
 ``L_r(p, d) = C(p, d) + min(L_r(p-r, d), L_r(p-r, d±1) + P1, min_k L_r(p-r, k) + P2) - min_k L_r(p-r, k)``
 
-A path begins at the image's border with the costs themselves. Of each pair of opposite directions, one is followed
-going down the image and the other going up, so two passes over the rows follow all.
+The penalties P1 and P2 depend on the direction and on the view (``edges``). A path begins at the image's border with
+the costs themselves. Of each pair of opposite directions, one is followed going down the image and the other going up,
+so two passes over the rows follow all.
 
 Source: Hirschmüller, "Stereo processing by semiglobal matching and mutual information", PAMI 2008.
 """
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import kernel
-from semidense.stages.disparity.aggregation.levels import SCALE
+from semidense.stages.disparity.aggregation.edges import difference, is_oblique, penalties
 from semidense.stages.disparity.declaration import AggregatedParams
 
 DOWN = np.array([(0, 1), (1, -1), (1, 0), (1, 1), (1, 2), (1, -2), (2, 1), (2, -1)])
@@ -27,12 +28,6 @@ BEYOND = np.int16(16_000)
 def steps_down(params: AggregatedParams) -> NDArray[np.int64]:
     """Return the steps of the paths that are followed going down, (path, 2)."""
     return DOWN[: params.paths // 2]
-
-
-def penalties(params: AggregatedParams) -> NDArray[np.int16]:
-    """Return P1 and P2 in levels, (plain or edge, 2)."""
-    plain = np.array([params.p1, params.p2]) * SCALE
-    return np.rint([plain, plain / params.edge_divisor]).astype(np.int16)
 
 
 @dataclass(frozen=True)
@@ -71,7 +66,7 @@ def follow(
 
     Args:
         above: (y, x, d) int16 costs of the rows, levels above the pixel's least, at most ``2 * CAP``.
-        gray: (y, x) uint8 of the whole image.
+        gray: (y, x) uint8 of the whole view, smoothed.
         top: the row of the image that is the first of ``above``.
         params: paths and penalties.
         front: of the rows before, which lie below when going upwards.
@@ -84,7 +79,7 @@ def follow(
     # One more row, which the first row is written to; afterwards the oldest row goes.
     costs, least = (np.concatenate([each, each[:, :1]], axis=1) for each in (front.costs, front.least))
     steps, table = steps_down(params), penalties(params)
-    _follow(above, gray, top, steps, table, params.edge_step, costs, least, sums, upwards)
+    _follow(above, gray, top, steps, table, costs, least, sums, upwards)
     turn = -(len(above) % costs.shape[1])
     return Front(*(np.roll(each, turn, axis=1)[:, :-1].copy() for each in (costs, least)))
 
@@ -96,7 +91,6 @@ def _follow(
     top: int,
     steps: NDArray[np.int64],
     table: NDArray[np.int16],
-    edge_step: int,
     costs: NDArray[np.int16],
     least: NDArray[np.int16],
     sums: NDArray[np.int16],
@@ -117,8 +111,7 @@ def _follow(
                 top + y,
                 dy,
                 dx,
-                table,
-                edge_step,
+                table[is_oblique(dy, dx)],
                 costs[path, before],
                 costs[path, now],
                 least[path, before],
@@ -136,7 +129,6 @@ def _follow_row(
     dy: int,
     dx: int,
     table: NDArray[np.int16],
-    edge_step: int,
     before: NDArray[np.int16],
     now: NDArray[np.int16],
     least_before: NDArray[np.int16],
@@ -150,18 +142,10 @@ def _follow_row(
     for column in range(width):
         x = width - 1 - column if backwards else column
         own, other = x + margin, x - dx + margin
-        edge = is_edge(gray, y, x, y - dy, x - dx, edge_step)
+        change = difference(gray, y, x, y - dy, x - dx)
         least_now[own] = _extend(
-            before, other, now, own, least_before[other], table[edge, 0], table[edge, 1], above, sums, x
+            before, other, now, own, least_before[other], table[change, 0], table[change, 1], above, sums, x
         )
-
-
-@kernel
-def is_edge(gray: NDArray[np.uint8], y: int, x: int, v: int, u: int, edge_step: int) -> int:
-    """Return 1 if the gray of two pixels differs by more than a step, 0 if not or if (v, u) is outside the image."""
-    if not (0 <= v < gray.shape[0] and 0 <= u < gray.shape[1]):
-        return 0
-    return 1 if abs(np.int64(gray[y, x]) - np.int64(gray[v, u])) > edge_step else 0
 
 
 @kernel

@@ -5,6 +5,7 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
+from semidense.stages.disparity.aggregation.edges import smooth
 from semidense.stages.disparity.aggregation.strips import Strip, Volume, aggregate
 from semidense.stages.disparity.aggregation.winner import NONE, parabola, winner
 from semidense.stages.disparity.declaration import AggregatedParams
@@ -74,7 +75,7 @@ def _maps(params: AggregatedParams, volume: Volume, d_min: int, gray: NDArray[np
     """Return disparity and evidence, filled strip by strip."""
     disparity = np.empty(gray.shape, np.float32)
     found = np.empty((len(FEATURES), *gray.shape), np.float16)
-    for strip in aggregate(volume, np.ascontiguousarray(gray), d_min, params):
+    for strip in aggregate(volume, smooth(gray), d_min, params):
         index = winner(strip)
         disparity[strip.rows] = _disparity(strip, index, params)
         found[:, strip.rows] = evidence(strip, index, params.paths)

@@ -61,7 +61,7 @@ def aggregate(
     Args:
         volume: (y, x, d) float16 or float32 costs, lower is better; NaN is a cell without a cost. It is read once a
             sweep, a strip at a time; once in all, if it is one strip.
-        gray: (y, x) uint8 of the same view: penalties are smaller across its edges.
+        gray: (y, x) uint8 of the same view, smoothed: penalties are smaller across its edges.
         d_min: the disparity of index 0, px.
         params: paths and penalties.
         rows: rows of a strip; None: as many as ``CELLS`` allows.

@@ -14,7 +14,6 @@ from torch.nn import functional
 
 from semidense.stages.compute.precision import Precision, autocast
 from semidense.stages.disparity.aggregation.differentiable import path_sums
-from semidense.stages.disparity.declaration import AggregatedParams
 from semidense.stages.learning.augmentation import relight
 from semidense.stages.learning.scenes import Scenes
 from semidense.stages.matching.crops import Channels, cut, to_tensor
@@ -29,6 +28,10 @@ from semidense.stages.transforms.gray import to_gray
 
 CAP = 40.0
 """Largest cost above the pixel's least, log-odds, as when costs are summed for a map."""
+PENALTIES = np.empty((2, 256, 2), np.float32)
+PENALTIES[:, :7], PENALTIES[:, 7:] = (24, 192), (3, 24)
+"""Penalties P1 and P2 of all paths by the difference of gray, log-odds: an eighth where it is above 6 levels. They are
+smaller than those of a map, and leave more to the costs."""
 TEMPERATURE = 24.0
 """Cost, summed over the paths, that makes a disparity e times less likely."""
 WINDOWS = ((1.0, 1.0), (3.0, 0.5))
@@ -144,7 +147,7 @@ def summed_loss(net: DescriptorNet, crop: WideCrop, precision: Precision = "floa
     each of ``WINDOWS``, weighed; the mean over these pixels. At the very edge of a window a disparity counts half.
     """
     known = torch.isfinite(crop.truth) & ~crop.outside.all(1)
-    sums = path_sums(crop_costs(net, crop, precision), crop.gray, AggregatedParams())
+    sums = path_sums(crop_costs(net, crop, precision), crop.gray, PENALTIES)
     probability = functional.softmax(-sums.masked_fill(crop.outside, torch.inf)[known] / TEMPERATURE, dim=1)
     distance = (torch.arange(sums.shape[2]) - crop.truth[known][:, None]).abs()
     losses = [

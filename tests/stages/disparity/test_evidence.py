@@ -13,7 +13,7 @@ PATHS = 8
 def features(costs: list[list[float]], sums: list[list[float]], d_min: int = 0) -> dict[str, list[float]]:
     """Return the features of a row of pixels, from single costs and from aggregated costs a path."""
     single = levels_of(np.array([costs], np.float16), d_min)
-    summed = (np.array([sums]) * 8 * PATHS).astype(np.uint16)
+    summed = (np.array([sums]) * 4 * PATHS).astype(np.uint16)
     strip = Strip(slice(0, 1), single, summed, summed)
     made = evidence(strip, winner(strip), PATHS)
     assert made.dtype == np.float32 and made.shape == (len(FEATURES), 1, len(costs))

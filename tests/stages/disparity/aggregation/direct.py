@@ -12,21 +12,45 @@ SIXTEEN = [*EIGHT, (1, 2), (-1, -2), (1, -2), (-1, 2), (2, 1), (-2, -1), (2, -1)
 
 
 def levels(costs: NDArray, d_min: int) -> list[list[list[int]]]:
-    """Return the cost of each cell above its pixel's least, in eighths, at most 320; without one 32."""
+    """Return the cost of each cell above its pixel's least, in quarters, at most 160; without one 16."""
     height, width = costs.shape[:2]
     return [[_levels_of_pixel(costs[y, x], x, width, d_min) for x in range(width)] for y in range(height)]
 
 
 def _levels_of_pixel(costs: NDArray, x: int, width: int, d_min: int) -> list[int]:
-    eighths = [None if np.isnan(cost) else round(float(np.float16(cost)) * 8) for cost in costs]
-    known = [cost for cost in eighths if cost is not None]
+    quarters = [None if np.isnan(cost) else round(float(np.float16(cost)) * 4) for cost in costs]
+    known = [cost for cost in quarters if cost is not None]
     if not known:
         return [0] * len(costs)
-    above = [32 if cost is None else min(cost - min(known), 320) for cost in eighths]
+    above = [16 if cost is None else min(cost - min(known), 160) for cost in quarters]
     inside = [0 <= x - d - d_min < width for d in range(len(costs))]
     cells = [cost for cost, here in zip(above, inside, strict=True) if here]
     mean = (2 * sum(cells) + len(cells)) // (2 * len(cells)) if cells else None
     return [cost if here or mean is None else mean for cost, here in zip(above, inside, strict=True)]
+
+
+def smoothed(gray: NDArray) -> NDArray:
+    """Return each pixel's mean with its neighbours, weighed 1, 2, 1 both ways; a half is rounded up."""
+    height, width = gray.shape
+    weights = {(dy, dx): (2 - abs(dy)) * (2 - abs(dx)) for dy in (-1, 0, 1) for dx in (-1, 0, 1)}
+    return (
+        np.array(
+            [
+                [
+                    sum(
+                        weight * int(gray[min(max(y + dy, 0), height - 1), min(max(x + dx, 0), width - 1)])
+                        for (dy, dx), weight in weights.items()
+                    )
+                    * 2
+                    // 16
+                    + 1
+                    for x in range(width)
+                ]
+                for y in range(height)
+            ]
+        )
+        // 2
+    )
 
 
 def sums(costs: NDArray, gray: NDArray, d_min: int, params: AggregatedParams) -> NDArray[np.int64]:
@@ -35,7 +59,7 @@ def sums(costs: NDArray, gray: NDArray, d_min: int, params: AggregatedParams) ->
     total = _sums(cost, costs.shape, gray, params)
     if params.passes == 2:
         half = params.paths // 2
-        mean = np.minimum((total - total.min(2, keepdims=True) + half) // params.paths, 320)
+        mean = np.minimum((total - total.min(2, keepdims=True) + half) // params.paths, 160)
         total = _sums((np.array(cost) + mean).tolist(), costs.shape, gray, params)
     return total
 
@@ -53,8 +77,9 @@ def _sums(
             if not (0 <= v < height and 0 <= u < width):
                 return cost[y][x]
             before = path(v, u, dy, dx)
-            edge = abs(int(gray[y, x]) - int(gray[v, u])) > params.edge_step
-            p1, p2 = (round(8 * p / (params.edge_divisor if edge else 1)) for p in (params.p1, params.p2))
+            change = abs(int(gray[y, x]) - int(gray[v, u])) / params.edge
+            first = params.oblique * params.p1 if dy and dx else params.p1
+            p1, p2 = (round(4 * p / (1 + change**1.5)) for p in (first, params.p2))
             low = min(before)
             return [
                 cost[y][x][d]

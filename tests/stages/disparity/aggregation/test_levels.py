@@ -18,15 +18,15 @@ def row(costs: list[list[float]], d_min: int, dtype: type = np.float16) -> tuple
 @pytest.mark.parametrize(
     ("costs", "above", "least"),
     [
-        pytest.param([1, -2], [24, 0], -16, id="above the least, in eighths"),
-        pytest.param([0, 0.1], [0, 1], 0, id="rounded"),
-        pytest.param([0, 60], [0, 320], 0, id="at most 40"),
-        pytest.param([N, 3], [32, 0], 24, id="a cell without a cost"),
+        pytest.param([1, -2], [12, 0], -8, id="above the least, in quarters"),
+        pytest.param([0, 0.2], [0, 1], 0, id="rounded"),
+        pytest.param([0, 60], [0, 160], 0, id="at most 40"),
+        pytest.param([N, 3], [16, 0], 12, id="a cell without a cost"),
         pytest.param([N, N], [0, 0], NO_COST, id="a pixel without any cost says nothing"),
-        pytest.param([I, 3], [320, 0], 24, id="infinity is the largest"),
-        pytest.param([-I, 3], [0, 320], -16384, id="minus infinity is the least"),
+        pytest.param([I, 3], [160, 0], 12, id="infinity is the largest"),
+        pytest.param([-I, 3], [0, 160], -16384, id="minus infinity is the least"),
         pytest.param([I, I], [0, 0], 16384, id="all infinite"),
-        pytest.param([-65504, 65504], [0, 320], -16384, id="the ends of float16"),
+        pytest.param([-65504, 65504], [0, 160], -16384, id="the ends of float16"),
     ],
 )
 def test_by_hand(costs: list[float], above: list[int], least: int, dtype: type) -> None:
@@ -38,9 +38,9 @@ def test_by_hand(costs: list[float], above: list[int], least: int, dtype: type) 
 @pytest.mark.parametrize(
     ("d_min", "expected"),
     [
-        pytest.param(0, [[0, 0, 0], [16, 0, 8], [0, 16, 32]], id="at the left border"),
-        pytest.param(-2, [[0, 16, 32], [16, 0, 32], [0, 0, 0]], id="at the right border"),
-        pytest.param(7, [[0, 16, 32], [16, 0, 32], [0, 16, 32]], id="no right pixel is in the image"),
+        pytest.param(0, [[0, 0, 0], [8, 0, 4], [0, 8, 16]], id="at the left border"),
+        pytest.param(-2, [[0, 8, 16], [8, 0, 16], [0, 0, 0]], id="at the right border"),
+        pytest.param(7, [[0, 8, 16], [8, 0, 16], [0, 8, 16]], id="no right pixel is in the image"),
     ],
 )
 def test_a_cell_outside_the_image_has_the_mean_of_the_others(d_min: int, expected: list[list[int]]) -> None:

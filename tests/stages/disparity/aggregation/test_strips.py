@@ -13,6 +13,7 @@ from tests.stages.disparity.aggregation.direct import sums
 
 Pair = tuple[np.ndarray, np.ndarray]
 N = np.nan
+ODD = {"p1": 2.3, "oblique": 0.47, "p2": 9, "edge": 3.7}
 
 
 def pair(shape: tuple[int, int, int], d_min: int = 0, seed: int = 0, spread: float = 6) -> Pair:
@@ -31,10 +32,10 @@ def aggregated(costs: np.ndarray, gray: np.ndarray, d_min: int, params: Aggregat
 
 
 def test_by_hand() -> None:
-    """One row of three pixels, d = 0, 1, 2. P1 = 1 and P2 = 2 are 8 and 16 levels, and 2 and 4 over the edge."""
-    costs = np.float16([[[0, N, N], [1, 0, N], [5, 5, 0]]])
+    """One row of three pixels, d = 0, 1, 2. P1 = 2 and P2 = 4 are 8 and 16 levels; over the edge 2 and 4, a quarter."""
+    costs = np.float16([[[0, N, N], [2, 0, N], [10, 10, 0]]])
     gray = np.uint8([[100, 100, 200]])
-    params = AggregatedParams(p1=1, p2=2, edge_divisor=4)
+    params = AggregatedParams(p1=2, oblique=0.5, p2=4, edge=100 / 3 ** (1 / 1.5))
     own = [(0, 0, 0), (8, 0, 4), (40, 40, 0)]  # cells outside the image have the mean of the pixel's others
     # From the left. Second pixel: its own costs, since the first one's are all 0. Third, over the edge, d = 0:
     # min(8, 0 + 2, 0 + 4) = 2; d = 1: 0; d = 2: min(4, 0 + 2, 0 + 4) = 2.
@@ -44,6 +45,16 @@ def test_by_hand() -> None:
     # The six other paths begin at each pixel with its own costs.
     expected = np.array(left) + np.array(right) + 6 * np.array(own)
     assert aggregated(costs, gray, 0, params, 1)[0].tolist() == expected.tolist()
+
+
+def test_an_oblique_path_has_its_own_small_penalty_by_hand() -> None:
+    """Two rows of two pixels: only the paths along one diagonal come from the pixel that knows d = 0."""
+    costs = np.float16([[[0, 40], [0, 0]], [[0, 0], [0, 0]]])
+    params = AggregatedParams(p1=20, oblique=0.05, p2=30)
+    made = aggregated(costs, np.zeros((2, 2), np.uint8), -9, params, 2)
+    # d = 1 costs P1 more than d = 0 where a path comes from the upper left pixel, which alone knows a disparity.
+    above = (made[..., 1] - made[..., 0]).tolist()
+    assert above == [[8 * 160, 80], [80, 4]]
 
 
 @pytest.mark.parametrize("passes", [1, 2])
@@ -62,7 +73,7 @@ def test_by_hand() -> None:
 )
 def test_as_the_equation_says(shape: tuple[int, int, int], d_min: int, paths: int, passes: int) -> None:
     costs, gray = pair(shape, d_min)
-    for values in ({}, {"p1": 0.5, "p2": 0.5}, {"p1": 0, "p2": 0}, {"p1": 2.3, "p2": 9, "edge_divisor": 3.7}):
+    for values in ({}, {"p1": 0.5, "p2": 0.5}, {"p1": 0, "p2": 0}, ODD):
         params = AggregatedParams(paths=paths, passes=passes, **values)
         assert np.array_equal(aggregated(costs, gray, d_min, params, 100), sums(costs, gray, d_min, params))
 
@@ -73,7 +84,7 @@ def test_the_largest_costs_and_penalties_fit(passes: int) -> None:
     rng = np.random.default_rng(0)
     costs = rng.choice(np.float16([-np.inf, -65504, 0, 65504, np.inf]), (6, 7, 4))
     gray = np.zeros((6, 7), np.uint8)
-    params = AggregatedParams(paths=16, p1=400, p2=400, passes=passes)
+    params = AggregatedParams(paths=16, p1=900, oblique=1, p2=900, passes=passes)
     finite = np.clip(costs, -2000, 2000)  # a difference of more than 40 is 40
     assert np.array_equal(aggregated(costs, gray, -3, params, 2), sums(finite, gray, -3, params))
 

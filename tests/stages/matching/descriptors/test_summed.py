@@ -57,7 +57,7 @@ def test_a_crop_as_large_as_the_image_has_the_costs_of_its_map(mirrored: bool, l
     above = levels_of(volume, low).above / SCALE
     made = crop_costs(net, crop, "float32").detach().numpy()
     assert made.shape == above.shape
-    assert np.abs(made - above).max() < 0.2, "an eighth is the step of the levels, and float16 rounds"
+    assert np.abs(made - above).max() < 0.3, "a quarter is the step of the levels, and float16 rounds"
     truth = scene["truth"]["right_disparity"][:, ::-1] if mirrored else scene["truth"]["disparity"]
     known = np.isfinite(crop.truth.numpy())
     assert known.any() and np.array_equal(crop.truth.numpy()[known] + low, truth[known])
