@@ -52,11 +52,14 @@ class AggregatedParams(Params):
     oblique: float = Field(
         0.25, ge=0, le=1, description="share of p1 along paths that are neither row nor column: these follow slopes"
     )
-    p2: float = Field(
+    p2: float = Field(  # sums of 16 paths fit 16 bits up to 900
         900, ge=0, le=900, description="penalty of a larger step, log-odds; larger: fewer jumps and fewer small objects"
     )
     edge: float = Field(
-        1.5, gt=0, le=100_000, description="the penalties are halved where the smoothed gray differs by so much, of 255"
+        1.5,
+        ge=0.01,
+        le=100_000,
+        description="the penalties are halved where the smoothed gray differs by so much, of 255",
     )
     passes: Literal[1, 2] = Field(
         1, description="2: add the mean of the first path costs to the cost of each cell, and sum once more"

@@ -69,6 +69,19 @@ def test_the_readme_quotes_the_accuracy_of_each_preset() -> None:
     assert figures("README.md") == figures("docs/accuracy.md")
 
 
+def test_a_page_that_quotes_another_quotes_its_figures() -> None:
+    """Of `robust` on MiddEval3 and KITTI 2015: its wrong pixels, the order of them, and what a wish gave."""
+    raw, auc, optimal, _, kept = next(row for row in rows("docs/accuracy.md") if row[0] == "mean")[1:]
+    found = {row[0]: row[1:] for row in reversed(list(rows("docs/comparison.md")))}  # the first row of a name
+    assert found["mean of the eight"][0] == found["MiddEval3, 8 scenes"][1] == found["MiddEval3, > 1 px"][0] == raw
+    assert found["ours, R = 0.9"][0] == found["MiddEval3, 8 scenes"][5] == kept
+    assert f"a perfect order has {optimal}" in text("docs/comparison.md") and auc in found
+    wishes = [cell.partition(" of ")[0] for cell in found["MiddEval3, within 1 px"][:3]]
+    assert "{}, {} and {} % are wrong where 1, 2 and 5 %".format(*wishes) in text("docs/own-pictures.md")
+    streets = next(row for row in rows("docs/comparison.md") if row[0] == "KITTI 2015" and " of " in row[2])
+    assert f"The preset `robust` has {streets[2].split()[0].strip('*')} % there" in text("README.md")
+
+
 def test_the_faults_that_a_page_tells_are_those_that_were_injected() -> None:
     row = next(row for row in json.loads((ROOT / "docs/faults.json").read_text())["rows"] if row["row"] == 29)
     killed, spoilt = row["figures"]["workers killed"], row["figures"]["requests spoilt"]

@@ -33,24 +33,14 @@ def smoothed(gray: NDArray) -> NDArray:
     """Return each pixel's mean with its neighbours, weighed 1, 2, 1 both ways; a half is rounded up."""
     height, width = gray.shape
     weights = {(dy, dx): (2 - abs(dy)) * (2 - abs(dx)) for dy in (-1, 0, 1) for dx in (-1, 0, 1)}
-    return (
-        np.array(
-            [
-                [
-                    sum(
-                        weight * int(gray[min(max(y + dy, 0), height - 1), min(max(x + dx, 0), width - 1)])
-                        for (dy, dx), weight in weights.items()
-                    )
-                    * 2
-                    // 16
-                    + 1
-                    for x in range(width)
-                ]
-                for y in range(height)
-            ]
-        )
-        // 2
-    )
+
+    def at(y: int, x: int) -> int:
+        return int(gray[min(max(y, 0), height - 1), min(max(x, 0), width - 1)])
+
+    def mean(y: int, x: int) -> float:
+        return sum(weight * at(y + dy, x + dx) for (dy, dx), weight in weights.items()) / 16
+
+    return np.array([[int(mean(y, x) + 0.5) for x in range(width)] for y in range(height)])
 
 
 def sums(costs: NDArray, gray: NDArray, d_min: int, params: AggregatedParams) -> NDArray[np.int64]:

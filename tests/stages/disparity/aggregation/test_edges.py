@@ -22,3 +22,8 @@ def test_both_penalties_are_halved_at_the_edge_that_is_asked_for() -> None:
     assert table[:, 4].tolist() == [[20, 100], [6, 100]]
     assert table[:, 16].tolist() == [[4, 22], [1, 22]], "four times the edge: 1 / (1 + 4 ** 1.5) = 1 / 9"
     assert (np.diff(table, axis=1) <= 0).all()
+
+
+def test_the_smallest_edge_leaves_no_penalty_where_the_gray_differs() -> None:
+    table = penalties(AggregatedParams(p1=110, p2=900, edge=0.01))
+    assert table[:, 0, 1].tolist() == [3600, 3600] and (table[:, 3:] <= 1).all()
