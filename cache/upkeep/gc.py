@@ -28,8 +28,9 @@ def survey(store: Store, limits: Limits) -> Survey:
     """Return what can be deleted; nothing is changed.
 
     Raises:
-        CacheUnavailable: if the file system refuses.
+        CacheUnavailable: if this is not a cache, or its place refuses.
     """
+    store.backend.require_cache()
     if isinstance(store.root, str):
         return objects_gc.survey(connect(store.root), limits)
     layout, used = store.layout, in_use(store.layout)
@@ -104,13 +105,13 @@ def collect(store: Store, items: Iterable[Item]) -> tuple[Item, ...]:
     """Delete what ``survey`` found, except what a process has begun to use since; return what was deleted.
 
     Raises:
-        CacheUnavailable: if the file system refuses; what was deleted by then stays deleted.
+        CacheUnavailable: if this is not a cache, or its place refuses; what was deleted by then stays deleted.
     """
-    if isinstance(store.root, str):
-        return objects_gc.collect(connect(store.root), tuple(items))
-    layout = store.layout
-    layout.require_cache()
+    store.backend.require_cache()
     items = tuple(items)
+    if isinstance(store.root, str):
+        return objects_gc.collect(connect(store.root), items)
+    layout = store.layout
     with leased(layout) as lease:
         done = _delete(layout, lease, [item for item in items if item.kind != "stale lock"])
     done += [item for item in items if item.kind == "stale lock" and remove_stale(layout, item.paths[0])]

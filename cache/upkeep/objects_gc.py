@@ -146,6 +146,8 @@ def _stale(found: _View) -> Iterator[Item]:
 
 def collect(objects: Objects, items: Collection[Item]) -> tuple[Item, ...]:
     """Delete what ``survey`` found, except what a run has begun to use since. See ``gc.collect``."""
+    if not items:  # this may be a prefix without a tag as yet: the mark of a cleaning would make it look foreign
+        return ()
     cleaning = take(objects, names.CLEANING, {"keys": sorted(item.name for item in items if item.kind in _RECORDS)})
     if cleaning is None:
         raise CacheUnavailable(f"somebody else is cleaning {objects.url}: wait until that is done")

@@ -237,9 +237,9 @@ def _exit_as_the_command_line(work: Callable[[], object]) -> None:
     try:
         work()
     except USER_ERRORS as error:
-        if "\n" in str(error):
-            os._exit(OTHER_ERROR)
-        os._exit(USER_ERROR)
+        sys.stderr.write(f"{type(error).__name__}: {error}")
+        sys.stderr.flush()
+        os._exit(OTHER_ERROR if "\n" in str(error) else USER_ERROR)
     except BaseException:  # noqa: BLE001
         import traceback
 

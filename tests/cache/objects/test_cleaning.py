@@ -42,6 +42,31 @@ def test_an_entry_that_nobody_uses_goes_with_its_data(objects_store: Store, make
     assert make(objects_store).digest == entry.digest
 
 
+def test_a_cleaning_with_nothing_to_delete_writes_nothing(
+    objects_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its mark in a prefix without a tag would make whoever creates the cache meanwhile take it for foreign."""
+    found, put = survey(objects_store, ALL).items, Objects._put
+
+    def refuse(*arguments: object) -> None:
+        raise AssertionError(f"wrote {arguments[1]}")
+
+    monkeypatch.setattr(Objects, "_put", refuse)
+    assert collect(objects_store, found) == found == ()
+    monkeypatch.setattr(Objects, "_put", put)
+    assert [each.path for each in objects_of(objects_store).below("")] == []
+
+
+def test_somebody_elses_objects_are_not_cleaned_away(objects_store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    place = f"data/{'0' * 32}/{'1' * 64}"
+    objects_of(objects_store).put(f"{place}/holiday.jpg", b"beach")
+    later(monkeypatch, objects_gc.ORPHAN_SECONDS + 1)
+    for refused in (lambda: survey(objects_store, ALL), lambda: collect(objects_store, ())):
+        with pytest.raises(CacheUnavailable, match="is not a cache: it holds 'data'"):
+            refused()
+    assert [each.path for each in objects_of(objects_store).below("")] == [f"{place}/holiday.jpg"]
+
+
 def test_what_a_living_run_uses_stays(memory: Store, make: Make) -> None:
     entry = make(memory)
     found = survey(memory, ALL)
@@ -55,6 +80,7 @@ def test_what_a_living_run_uses_stays(memory: Store, make: Make) -> None:
 
 def test_a_run_waits_for_a_cleaning_that_is_about_to_delete_what_it_wants(memory: Store, make: Make) -> None:
     entry = make(memory)
+    found = survey(memory, ALL).items
     cleaning = take(objects_of(memory), names.CLEANING, {"keys": [entry.key]})
     assert cleaning is not None
     with memory.lease() as lease:
@@ -63,7 +89,7 @@ def test_a_run_waits_for_a_cleaning_that_is_about_to_delete_what_it_wants(memory
         adding.join(0.3)
         assert adding.is_alive()
         with pytest.raises(CacheUnavailable, match="somebody else is cleaning"):
-            collect(memory, ())
+            collect(memory, found)
         cleaning.release()
         adding.join(10)
         assert not adding.is_alive()
