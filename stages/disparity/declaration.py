@@ -64,7 +64,10 @@ class AggregatedParams(Params):
     passes: Literal[1, 2] = Field(
         1, description="2: add the mean of the first path costs to the cost of each cell, and sum once more"
     )
-    subpixel: bool = Field(True, description="refine by a parabola through three summed costs")
+    subpixel: bool = Field(True, description="refine by a V through three summed costs")
+    median: Literal[1, 3, 5] = Field(
+        3, description="side of the window whose median each disparity becomes, px; 1: its own"
+    )
 
     @model_validator(mode="after")
     def _rising(self) -> "AggregatedParams":

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.disparity.aggregation.edges import smooth
+from semidense.stages.disparity.aggregation.median import median
 from semidense.stages.disparity.aggregation.strips import Strip, Volume, aggregate
-from semidense.stages.disparity.aggregation.winner import NONE, parabola, winner
+from semidense.stages.disparity.aggregation.winner import NONE, v_fit, winner
 from semidense.stages.disparity.declaration import AggregatedParams
 from semidense.stages.disparity.evidence import FEATURES, evidence
 from semidense.stages.disparity.right_view import right_costs
@@ -45,7 +46,7 @@ class OfCosts(TypedDict):
 
 
 def compute_aggregated(params: AggregatedParams, inputs: OfCosts) -> Aggregated:
-    """Compute the product ``aggregated``; see ``aggregate``, ``winner``, ``parabola`` and ``evidence``.
+    """Compute the product ``aggregated``; see ``aggregate``, ``winner``, ``v_fit``, ``median`` and ``evidence``.
 
     Raises:
         StageError: if volume, coordinate ``d`` and view do not fit together.
@@ -72,18 +73,18 @@ def _volume(inputs: OfCosts) -> tuple[Volume, int]:
 
 
 def _maps(params: AggregatedParams, volume: Volume, d_min: int, gray: NDArray[np.uint8]) -> Aggregated:
-    """Return disparity and evidence, filled strip by strip."""
+    """Return disparity and evidence, filled strip by strip; the evidence is that of the winner, before the median."""
     disparity = np.empty(gray.shape, np.float32)
     found = np.empty((len(FEATURES), *gray.shape), np.float16)
     for strip in aggregate(volume, smooth(gray), d_min, params):
         index = winner(strip)
         disparity[strip.rows] = _disparity(strip, index, params)
         found[:, strip.rows] = evidence(strip, index, params.paths)
-    return {"disparity": disparity, "evidence": found}
+    return {"disparity": median(disparity, params.median), "evidence": found}
 
 
 def _disparity(strip: Strip, index: NDArray[np.int32], params: AggregatedParams) -> NDArray[np.float32]:
     """Return the disparity of each winner, refined if asked for, NaN where there is none."""
     whole = (index + strip.single.d_min).astype(np.float32)
-    shift = parabola(strip, index) if params.subpixel else np.float32(0)
+    shift = v_fit(strip, index) if params.subpixel else np.float32(0)
     return np.where(index == NONE, np.float32(np.nan), whole + shift)

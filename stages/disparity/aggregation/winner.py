@@ -27,17 +27,19 @@ def winner(strip: Strip) -> NDArray[np.int32]:
     return index
 
 
-def parabola(strip: Strip, index: NDArray[np.int32]) -> NDArray[np.float32]:
-    """Return how far the lowest point of the parabola through the winner and its neighbours lies from it.
+def v_fit(strip: Strip, index: NDArray[np.int32]) -> NDArray[np.float32]:
+    """Return how far the tip of the V through the winner and its neighbours lies from it.
 
-    ``(S(d - 1) - S(d + 1)) / (2 (S(d - 1) - 2 S(d) + S(d + 1)))`` of the sums ``S`` of the first pass: those of a
-    second one lean more on the neighbours, so their lowest point lies further from the pixel's own.
+    Two lines of opposite slope meet at ``(S(d - 1) - S(d + 1)) / (2 (max(S(d - 1), S(d + 1)) - S(d)))``, where ``S``
+    is the sum of the sums of both passes, or of the one: those of the second say better where a surface lies, those of
+    the first by how much. Shimizu and Okutomi, 2001, name it the equiangular fit.
 
     Returns:
-        (y, x) float32 in [-0.5, 0.5] px; 0 at an end of the range or of the image, and where the three do not bend.
+        (y, x) float32 in [-0.5, 0.5] px; 0 at an end of the range or of the image, and where the winner costs as much
+        as both or more.
     """
     shift = np.zeros(index.shape, np.float32)
-    _shift(strip.first, index, strip.single.d_min, shift)
+    _shift(strip.first, strip.aggregated, index, strip.single.d_min, shift)
     return shift
 
 
@@ -66,19 +68,23 @@ def _least(aggregated: NDArray[np.uint16], least: NDArray[np.int16], d_min: int,
 
 
 @kernel
-def _shift(sums: NDArray[np.uint16], index: NDArray[np.int32], d_min: int, shift: NDArray[np.float32]) -> None:
+def _shift(
+    first: NDArray[np.uint16],
+    second: NDArray[np.uint16],
+    index: NDArray[np.int32],
+    d_min: int,
+    shift: NDArray[np.float32],
+) -> None:
     """Write the shift of each pixel that has a winner with two neighbours."""
-    height, width, depth = sums.shape
+    height, width, depth = first.shape
     for y in range(height):
         for x in range(width):
-            first, end = ends(x, width, d_min, depth)
+            begin, end = ends(x, width, d_min, depth)
             d = index[y, x]
-            if first < d < end - 1:
-                before, here, after = (
-                    np.int64(sums[y, x, d - 1]),
-                    np.int64(sums[y, x, d]),
-                    np.int64(sums[y, x, d + 1]),
-                )
-                bend = before - 2 * here + after
-                if bend > 0:  # the winner of a second pass may not be the least of the first one
-                    shift[y, x] = min(max((before - after) / (2 * bend), -0.5), 0.5)
+            if begin < d < end - 1:
+                before = np.int64(first[y, x, d - 1]) + np.int64(second[y, x, d - 1])
+                here = np.int64(first[y, x, d]) + np.int64(second[y, x, d])
+                after = np.int64(first[y, x, d + 1]) + np.int64(second[y, x, d + 1])
+                slope = max(before, after) - here
+                if slope > 0:  # the winner of the second pass may not be the least of both
+                    shift[y, x] = min(max((before - after) / (2 * slope), -0.5), 0.5)

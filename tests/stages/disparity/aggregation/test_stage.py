@@ -5,6 +5,7 @@ import pytest
 import zarr
 
 from semidense.stages.disparity.aggregation import strips
+from semidense.stages.disparity.aggregation.median import median
 from semidense.stages.disparity.aggregation.stage import compute_aggregated, compute_right_aggregated
 from semidense.stages.disparity.declaration import AGGREGATED, RIGHT_AGGREGATED, AggregatedParams
 from semidense.stages.disparity.evidence import FEATURES
@@ -14,7 +15,7 @@ from tests.stages.disparity.aggregation.test_strips import pair
 from tests.stages.tiling import same
 
 Inputs = dict[str, dict[str, Any]]
-WHOLE = AggregatedParams(p1=2, p2=7, subpixel=False)
+WHOLE = AggregatedParams(p1=2, p2=7, subpixel=False, median=1)
 both = pytest.mark.parametrize("stage", [AGGREGATED, RIGHT_AGGREGATED], ids=lambda stage: stage.product)
 
 
@@ -74,7 +75,7 @@ def test_however_it_is_cut_and_wherever_it_is_read_from(stage: Stage, monkeypatc
 
 def test_subpixel_moves_a_disparity_by_at_most_half_a_pixel() -> None:
     whole, refined = (
-        compute_aggregated(params, inputs())["disparity"] for params in (WHOLE, AggregatedParams(p1=2, p2=7))
+        compute_aggregated(params, inputs())["disparity"] for params in (WHOLE, AggregatedParams(p1=2, p2=7, median=1))
     )
     moved = np.abs(whole - refined)
     assert np.nanmax(moved) <= 0.5 and np.nanmean(moved > 0) > 0.3
@@ -104,3 +105,17 @@ def test_a_volume_that_does_not_fit_its_range_is_refused() -> None:
 def test_a_larger_penalty_for_a_smaller_step_is_refused() -> None:
     with pytest.raises(ValueError, match="p2 8 must be at least p1 9"):
         AggregatedParams(p1=9, p2=8)
+
+
+@both
+@pytest.mark.parametrize("d_min", [-3, 0])
+def test_the_median_is_that_of_the_map_and_stays_in_the_other_view(stage: Stage, d_min: int) -> None:
+    alone, smooth = (
+        stage.function()(AggregatedParams(p1=2, p2=7, median=side), inputs(d_min=d_min)) for side in (1, 3)
+    )
+    np.testing.assert_array_equal(smooth["evidence"], alone["evidence"])
+    mirrored = slice(None, None, -1 if stage is RIGHT_AGGREGATED else 1)
+    expected = median(np.ascontiguousarray(alone["disparity"][:, mirrored]), 3)
+    np.testing.assert_array_equal(smooth["disparity"][:, mirrored], expected)
+    met = np.arange(9) - expected
+    assert np.nanmin(met) >= 0 and np.nanmax(met) <= 8

@@ -5,7 +5,7 @@ import pytest
 
 from semidense.stages.disparity.aggregation.levels import NO_COST, Levels
 from semidense.stages.disparity.aggregation.strips import Strip
-from semidense.stages.disparity.aggregation.winner import NONE, parabola, winner
+from semidense.stages.disparity.aggregation.winner import NONE, v_fit, winner
 
 
 def strip(sums: list[list[int]], d_min: int = 0, least: int = 0) -> Strip:
@@ -39,27 +39,27 @@ def test_a_pixel_without_any_cost_has_no_winner() -> None:
     ("sums", "index", "expected"),
     [
         pytest.param([4, 0, 4], 1, 0, id="symmetrical"),
-        pytest.param([4, 0, 12], 1, -0.25, id="towards the lower side"),
-        pytest.param([40000, 30000, 60000], 1, -0.25, id="sums are not signed"),
-        pytest.param([0, 0, 8], 1, -0.5, id="at most half a pixel"),
+        pytest.param([5, 1, 13], 1, np.float32(-1 / 3), id="towards the lower side"),
+        pytest.param([40000, 30000, 60000], 1, np.float32(-1 / 3), id="sums are not signed"),
+        pytest.param([0, 0, 8], 1, -0.5, id="as low on one side"),
+        pytest.param([0, 2, 8], 1, -0.5, id="lower on one side: at most half a pixel"),
+        pytest.param([0, 2, 1], 1, 0, id="lower on both sides"),
         pytest.param([3, 3, 3], 1, 0, id="flat"),
         pytest.param([0, 1, 2], 0, 0, id="first of the range"),
         pytest.param([2, 1, 0], 2, 0, id="last of the range"),
         pytest.param([2, 1, 0], NONE, 0, id="no winner"),
     ],
 )
-def test_the_parabola_by_hand(sums: list[int], index: int, expected: float) -> None:
-    made = parabola(strip([sums] * 9), np.full((1, 9), index, np.int32))
+def test_the_v_by_hand(sums: list[int], index: int, expected: float) -> None:
+    made = v_fit(strip([sums] * 9), np.full((1, 9), index, np.int32))
     assert made.dtype == np.float32 and made[0, 4] == expected
 
 
-def test_the_parabola_needs_neighbours_in_the_image() -> None:
-    assert parabola(strip([[4, 0, 12]] * 9), np.full((1, 9), 1, np.int32))[0, :3].tolist() == [0, 0, -0.25]
+def test_the_v_needs_neighbours_in_the_image() -> None:
+    assert v_fit(strip([[4, 0, 8]] * 9), np.full((1, 9), 1, np.int32))[0, :3].tolist() == [0, 0, -0.25]
 
 
-def test_the_parabola_goes_through_the_sums_of_the_first_pass() -> None:
-    twice = replace(strip([[9, 9, 0, 9, 9]] * 9), first=strip([[4, 0, 2, 9, 9]] * 9).aggregated)
+def test_the_v_goes_through_the_sums_of_both_passes() -> None:
+    twice = replace(strip([[9, 9, 0, 9, 9]] * 9), first=strip([[4, 0, 7, 14, 9]] * 9).aggregated)
     assert winner(twice)[0, 8] == 2
-    assert parabola(twice, winner(twice))[0, 8] == -0.5, "its lowest point lies 0.9 px to the left"
-    level = replace(twice, first=strip([[9, 4, 0, 12, 9]] * 9).aggregated)
-    assert parabola(level, winner(level))[0, 8] == -0.25
+    assert v_fit(twice, winner(twice))[0, 8] == np.float32(-14 / 32)
