@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -237,8 +237,9 @@ def _exit_as_the_command_line(work: Callable[[], object]) -> None:
     try:
         work()
     except USER_ERRORS as error:
-        sys.stderr.write(f"{type(error).__name__}: {error}")
-        sys.stderr.flush()
+        with suppress(OSError):  # a file may be too large for what the child may write
+            sys.stderr.write(f"{type(error).__name__}: {error}")
+            sys.stderr.flush()
         os._exit(OTHER_ERROR if "\n" in str(error) else USER_ERROR)
     except BaseException:  # noqa: BLE001
         import traceback
