@@ -18,7 +18,7 @@ import zarr
 from numpy.typing import NDArray
 from zarr.codecs import ZstdCodec
 
-from benchmarks.harness import Ratio, compare, report
+from benchmarks.harness import Ratio, as_command, compare, report
 from semidense.cache.entries.arrays import ZSTD_LEVEL
 from semidense.stages.disparity.aggregation.stage import compute_aggregated
 from semidense.stages.disparity.aggregation.strips import Volume, aggregate
@@ -101,4 +101,4 @@ def main(shrink: Annotated[int, typer.Option(min=1, help="Divide the sides of bo
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

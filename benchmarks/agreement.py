@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.harness import write
+from benchmarks.harness import as_command, write
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.results.result import Result
 from semidense.stages.evaluation.agreement import agreement
@@ -88,4 +88,4 @@ def _table(found: Mapping[int, Sequence[float]], only: Mapping[int, float], usua
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

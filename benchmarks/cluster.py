@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from dask.diagnostics import Profiler
 
-from benchmarks.harness import PAIRS, Ratio, compare, report
+from benchmarks.harness import PAIRS, Ratio, as_command, compare, report
 from benchmarks.simulation import handling_seconds
 from benchmarks.workers import MADE
 from semidense.pipeline.api import Task, run, status
@@ -54,4 +54,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

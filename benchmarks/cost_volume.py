@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.guided import Side, shipped_nets
-from benchmarks.harness import FOLDER, PAIRS, Ratio, compare, median_seconds, report, timed, write
+from benchmarks.harness import FOLDER, PAIRS, Ratio, as_command, compare, median_seconds, report, timed, write
 from benchmarks.peers import AccurateMatcher, PeerError
 from semidense.datasets import Scene, open_dataset
 from semidense.pipeline.figures.colours import LINES
@@ -185,4 +185,4 @@ def _draw(matchers: dict[str, dict[str, float]], title: str, path: Path) -> None
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

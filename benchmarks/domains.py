@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.harness import write
+from benchmarks.harness import as_command, write
 from semidense.datasets import SceneSource, open_dataset, read_pfm
 from semidense.pipeline.api import Task, carry_out
 from semidense.pipeline.execution.progress import ProgressWatch
@@ -223,4 +223,4 @@ def _promised(maps: _Maps, wish: float) -> Figures:
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

@@ -7,15 +7,16 @@ are wrong, and how many of as many pixels, and of 70 %, that our score keeps and
 both views see, wrong above 1 px. MAPS is what ``python -m benchmarks.pandora`` wrote; without it Pandora is left out.
 """
 
-import argparse
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
+from benchmarks.harness import as_command
 from semidense.datasets import SceneSource, Truth, open_dataset, read_pfm
 from semidense.pipeline.plan.images_and_truth import read_images
 from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
@@ -130,34 +131,33 @@ def _block(images: Mapping[str, Array], disparity: Array, views: Array, nets: Ma
     }
 
 
-def rows(dataset: str, matchers: list[str], pandora: Path) -> Iterator[tuple[str, str, list[float]]]:
+def rows(dataset: str, matchers: list[str], pandora: Path | None) -> Iterator[tuple[str, str, list[float]]]:
     """Yield matcher, scene and figures."""
     nets = {name: read_network(shipped_weights(name, "exact"), {}) for name in NETS}
     for matcher in matchers:
         for scene in open_dataset(dataset).scenes:
-            found = read_pandora(scene, pandora) if matcher == PANDORA else matched(scene, matcher)
+            found = read_pandora(scene, pandora) if pandora and matcher == PANDORA else matched(scene, matcher)
             yield matcher, scene.name, figures(scene, found, nets)
 
 
-def main() -> None:
+def main(
+    dataset: Annotated[str, typer.Argument(help="such as middlebury:DIR/MiddEval3/trainingQ")],
+    matcher: Annotated[list[str] | None, typer.Option(help=f"{', '.join((*MATCHERS, PANDORA))}; default: all")] = None,
+    pandora: Annotated[Path | None, typer.Option(help="folder that benchmarks.pandora wrote")] = None,
+) -> None:
     """Print a row a map, and the means of each matcher."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("dataset")
-    parser.add_argument(
-        "--matcher", action="append", choices=(*MATCHERS, PANDORA), help="may be repeated; default: all"
-    )
-    parser.add_argument("--pandora", type=Path, help="folder that benchmarks.pandora wrote")
-    given = parser.parse_args()
-    chosen = given.matcher or [*MATCHERS, *([PANDORA] if given.pandora else [])]
-    if PANDORA in chosen and not given.pandora:
-        parser.error("--matcher pandora needs its maps: --pandora FOLDER")
+    chosen = matcher or [*MATCHERS, *([PANDORA] if pandora else [])]
+    if unknown := set(chosen) - {*MATCHERS, PANDORA}:
+        raise typer.BadParameter(f"no matcher is called {min(unknown)}: choose from {', '.join((*MATCHERS, PANDORA))}")
+    if PANDORA in chosen and not pandora:
+        raise typer.BadParameter("--matcher pandora needs its maps: --pandora FOLDER")
     print(f"{'':24}" + "".join(f"{name:>10}" for name in COLUMNS))
     by_matcher: dict[str, list[list[float]]] = {}
-    for matcher, scene, found in rows(given.dataset, chosen, given.pandora):
-        by_matcher.setdefault(matcher, []).append(found)
-        print(_line(f"{matcher} {scene}", found), flush=True)
-    for matcher, each in by_matcher.items():
-        print(_line(f"{matcher}, mean", np.mean(each, axis=0)))
+    for name, scene, found in rows(dataset, chosen, pandora):
+        by_matcher.setdefault(name, []).append(found)
+        print(_line(f"{name} {scene}", found), flush=True)
+    for name, each in by_matcher.items():
+        print(_line(f"{name}, mean", np.mean(each, axis=0)))
 
 
 def _line(name: str, found: list[float] | NDArray[np.float64]) -> str:
@@ -165,4 +165,4 @@ def _line(name: str, found: list[float] | NDArray[np.float64]) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    as_command(main)

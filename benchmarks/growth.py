@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from benchmarks.harness import PAIRS, Ratio, report, timed
+from benchmarks.harness import PAIRS, Ratio, as_command, report, timed
 from semidense.pipeline.api import Task, run
 from semidense.stages.matching.cost_volume import valid_columns
 
@@ -56,4 +56,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

@@ -22,6 +22,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.harness import as_command
 from semidense.cache.entries import check
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.results.result import Result
@@ -153,4 +154,4 @@ def guarding(
 
 
 if __name__ == "__main__":
-    typer.run(guarding)
+    as_command(guarding)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.harness import PAIRS, Ratio, report, timed
+from benchmarks.harness import PAIRS, Ratio, as_command, report, timed
 from semidense.datasets import SceneSource, open_dataset
 from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
 from semidense.stages.compute.precision import resolve
@@ -128,4 +128,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

@@ -2,15 +2,18 @@
 
 import json
 import os
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
+from semidense.pipeline.plan.errors import told
 from semidense.stages.compute.allocator import keep_freed_memory
 
 keep_freed_memory()  # as the command line does, whose speed is measured
@@ -86,6 +89,17 @@ def report(name: str, ratios: Sequence[Ratio]) -> None:
     rows = [asdict(ratio) | {"median": ratio.median, "met": ratio.met} for ratio in ratios]
     write(name, {"ratios": rows})
     print_rows(rows)
+
+
+def as_command(command: Callable[..., object]) -> None:
+    """Run a benchmark as a command: a user's mistake is one line and exit code 2, as of ``pipeline``."""
+    try:
+        typer.run(command)
+    except Exception as error:
+        if (line := told(error)) is None:
+            raise
+        print(line, file=sys.stderr)
+        raise SystemExit(2) from None
 
 
 def write(name: str, content: Mapping[str, object]) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from benchmarks.harness import write
+from benchmarks.harness import as_command, write
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.plan.training_split import assign_folds
 from semidense.stages.evaluation.evidence.confidence import weigh
@@ -75,4 +75,4 @@ def _figures(crops: Crops, parameters: NDArray[np.float32], tolerance: float) ->
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

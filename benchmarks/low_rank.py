@@ -14,7 +14,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.harness import write
+from benchmarks.harness import as_command, write
 from benchmarks.precision import block_costs, middle_rows
 from semidense.datasets import SceneSource, open_dataset
 from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
@@ -83,4 +83,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

@@ -19,7 +19,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from benchmarks.harness import Ratio, Side, report, timed
+from benchmarks.harness import Ratio, Side, as_command, report, timed
 from semidense.cache import Store
 from semidense.cache.entries import check
 from semidense.pipeline.api import Task, open_store, run, status
@@ -139,4 +139,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from benchmarks.cached_run import ENTRY
-from benchmarks.harness import Ratio, report
+from benchmarks.harness import Ratio, as_command, report
 
 SIZES = ((500, 741, 70), (1000, 1500, 8), (2000, 3000, 8))
 """Rows, columns, disparities."""
@@ -59,4 +59,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

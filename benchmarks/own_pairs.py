@@ -30,7 +30,7 @@ from PIL import Image
 from skimage.data import stereo_motorcycle
 
 from benchmarks.cached_run import ENTRY
-from benchmarks.harness import Ratio, report, timed
+from benchmarks.harness import Ratio, as_command, report, timed
 from benchmarks.pandora import ENVIRONMENT, PIPELINE, environment
 from benchmarks.peers import PeerError
 from semidense.datasets.formats.pfm import write_pfm
@@ -171,4 +171,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

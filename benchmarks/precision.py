@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.harness import timed
+from benchmarks.harness import as_command, timed
 from semidense.datasets import SceneSource, open_dataset
 from semidense.pipeline.plan.shipped_weights import read_network, shipped_weights
 from semidense.stages.compute.precision import Precision, fast_bfloat16
@@ -84,4 +84,4 @@ def compare(
 
 
 if __name__ == "__main__":
-    typer.run(compare)
+    as_command(compare)

@@ -14,7 +14,7 @@ import typer
 from numpy.typing import NDArray
 from rich.table import Column, Table
 
-from benchmarks.harness import write
+from benchmarks.harness import as_command, write
 from semidense.datasets import SceneSource
 from semidense.datasets.scene import Truth
 from semidense.pipeline.api import Task, run
@@ -107,4 +107,4 @@ def _judged(task: Task, product: str) -> list[Judged]:
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

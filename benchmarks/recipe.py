@@ -17,7 +17,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.harness import write
+from benchmarks.harness import as_command, write
 from semidense.datasets import SceneSource, open_dataset
 from semidense.pipeline.api import Task, carry_out
 from semidense.pipeline.execution.progress import ProgressWatch
@@ -107,4 +107,4 @@ def raw_error(result: Result, scene: SceneSource, rows: int, params: CostVolumeP
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

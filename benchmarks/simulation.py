@@ -18,7 +18,7 @@ import typer
 from dask.diagnostics import Profiler
 from rich.console import Console
 
-from benchmarks.harness import timed, write
+from benchmarks.harness import as_command, timed, write
 from semidense.datasets import open_dataset
 from semidense.pipeline.api import Task, run, status
 from semidense.pipeline.execution.graph import make_graph
@@ -206,4 +206,4 @@ def _tell(workers: int, found: Outcome) -> None:
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.harness import timed, write
+from benchmarks.harness import as_command, timed, write
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.figures.colours import BLUE, LINES
 from semidense.pipeline.figures.drawing import legend_below, new_figure
@@ -108,4 +108,4 @@ def _draw_load(axes: Axes, times: Sequence[float], values: Sequence[float], labe
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 import typer
 
-from benchmarks.harness import PAIRS, compare, report
+from benchmarks.harness import PAIRS, as_command, compare, report
 from semidense.datasets import open_dataset
 from semidense.stages.compute.threads import keep_one_thread
 from semidense.stages.learning.optimiser import optimisers_of
@@ -70,4 +70,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

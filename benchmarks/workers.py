@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from benchmarks.harness import PAIRS, compare, report
+from benchmarks.harness import PAIRS, as_command, compare, report
 from semidense.pipeline.api import Task, run, status
 from semidense.stages.catalog import CATALOG
 
@@ -39,4 +39,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    as_command(main)

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +29,7 @@ from benchmarks import (
     transforms,
     workers,
 )
-from benchmarks.harness import Ratio, compare
+from benchmarks.harness import Ratio, as_command, compare
 from semidense.datasets import open_dataset, write_pfm
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.plan.errors import UsageError
@@ -240,3 +241,27 @@ def test_the_direct_loop_of_the_transforms_is_the_definition() -> None:
     gray, out = np.array([[1, 2, 3]], np.uint8), np.empty((1, 3), np.float32)
     transforms.direct_rank(gray, 1, out)
     assert out.tolist() == [[0.5, np.float32(1 / 3), 0.0]]
+
+
+@pytest.mark.parametrize("error", [UsageError("toml:x: no such file"), FileNotFoundError(2, "No such file", "x.toml")])
+def test_a_users_mistake_is_one_line(
+    error: Exception, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def main() -> None:
+        raise error
+
+    monkeypatch.setattr(sys, "argv", ["benchmark"])
+    with pytest.raises(SystemExit) as left:
+        as_command(main)
+    written = capsys.readouterr()
+    assert left.value.code == 2 and written.out == ""
+    assert written.err.count("\n") == 1 and "o such file" in written.err
+
+
+def test_a_fault_of_a_benchmark_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+    def main() -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(sys, "argv", ["benchmark"])
+    with pytest.raises(ZeroDivisionError):
+        as_command(main)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
 from benchmarks import foreign, kinds, pandora
 from benchmarks.peers import PeerError
@@ -43,10 +44,7 @@ def test_pandoras_maps_go_into_the_table(
     pandora.write(found, scene.name, tmp_path)
     read = foreign.read_pandora(scene, tmp_path)
     np.testing.assert_array_equal(read.checked, found["checked"])
-    monkeypatch.setattr(
-        sys, "argv", ["foreign", TINY, "--matcher", "sgm", "--matcher", "pandora", "--pandora", str(tmp_path)]
-    )
-    foreign.main()
+    foreign.main(TINY, ["sgm", "pandora"], tmp_path)
     _, *rows = (line.split() for line in capsys.readouterr().out.splitlines())
     assert [row[0] for row in rows] == ["sgm", "pandora", "sgm,", "pandora,"]
     by_matcher = {row[0]: dict(zip(foreign.COLUMNS, map(float, row[2:]), strict=True)) for row in rows[:2]}
@@ -57,6 +55,12 @@ def test_pandoras_maps_go_into_the_table(
     # A measure that tells nothing leaves the share of wrong pixels as it is, at every density.
     wrong = pandora.figures(scene, found)[0]
     assert np.isclose(100 * by_matcher["pandora"]["risk"], wrong, atol=0.05)
+
+
+@pytest.mark.parametrize(("matcher", "said"), [("raft", "no matcher is called raft: choose"), ("pandora", "--pandora")])
+def test_a_matcher_that_cannot_be_scored_is_refused(matcher: str, said: str) -> None:
+    with pytest.raises(typer.BadParameter, match=said):
+        foreign.main(TINY, [matcher])
 
 
 def test_a_pandora_that_does_not_run_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
