@@ -64,9 +64,11 @@ class AggregatedParams(Params):
     passes: Literal[1, 2] = Field(
         1, description="2: add the mean of the first path costs to the cost of each cell, and sum once more"
     )
-    subpixel: bool = Field(True, description="refine by a V through three summed costs")
+    subpixel: bool = Field(
+        True, description="refine the disparity below a pixel, to the tip of a V through three summed costs"
+    )
     median: Literal[1, 3, 5] = Field(
-        3, description="side of the window whose median each disparity becomes, px; 1: its own"
+        3, description="side of the square window, px, whose median takes the place of each disparity; 1: no median"
     )
 
     @model_validator(mode="after")
@@ -118,8 +120,9 @@ AGGREGATED = Stage(
     params=AggregatedParams,
     lazy=("costvolume",),
 )
-"""The left view's disparity of least aggregated cost, and what the costs say of it. ``use.disparity=aggregated`` puts
-it in the place of ``disparity``. Not tiled: paths run over the whole image; the volume is read in strips."""
+"""The left view's disparity of least aggregated cost, after a median, and what the costs say of it before the median.
+``use.disparity=aggregated`` puts it in the place of ``disparity``. Not tiled: paths run over the whole image; the
+volume is read in strips."""
 
 RIGHT_AGGREGATED = Stage(
     product="right_aggregated",
