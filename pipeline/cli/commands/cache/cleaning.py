@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 from rich.markup import escape
@@ -17,6 +18,7 @@ from semidense.pipeline.plan.building import build
 from semidense.pipeline.plan.environment import former_version
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import close_ranges
+from semidense.pipeline.plan.presets import DEFAULT
 from semidense.pipeline.plan.steps import Graph, Step
 from semidense.pipeline.results.text import bytes_text, print_table, results
 
@@ -34,6 +36,7 @@ class Wish:
 
     keep: tuple[str, ...] = ()
     configs: tuple[Path, ...] = ()
+    presets: tuple[str, ...] = ()
     train: bool = False
     unused_for: str | None = None
     max_size: str | None = None
@@ -44,8 +47,8 @@ class Wish:
         Raises:
             UsageError, DatasetError: if a dataset, a configuration, an age or a size is none.
         """
-        if (self.configs or self.train) and not self.keep:
-            raise UsageError("--config and --train say how a dataset is kept: name it with --keep DATASET")
+        if (self.configs or self.presets or self.train) and not self.keep:
+            raise UsageError("--config, --preset and --train say how a dataset is kept: name it with --keep DATASET")
         seconds = _amount(self.unused_for, _UNITS, "--unused-for", "30d, 12h, 5min")
         largest = _amount(self.max_size, _BYTES, "--max-size", "20GB, 500MB")
         entries = list(open_store(folder).entries())
@@ -53,15 +56,14 @@ class Wish:
         return Limits(reached, seconds, None if largest is None else int(largest), _useless(entries))
 
     def _reached(self, folder: str | None, entries: Sequence[Entry]) -> Iterator[str]:
-        """Yield the keys that the datasets reach, each with each configuration."""
+        """Yield the keys that the datasets reach, each with each configuration and each preset."""
         store, by_label = open_store(folder), dict[Label, list[Entry]]()
         for entry in entries:
             by_label.setdefault(_label(entry.label), []).append(entry)
         digests = {entry.key: entry.digest for entry in entries}
-        for dataset in self.keep:
-            for config in self.configs or (None,):
-                request = Task(dataset, config=config, train=self.train).request("metrics")
-                yield from _keys(build(close_ranges(request, store)), digests, by_label)
+        for dataset, config, preset in product(self.keep, self.configs or (None,), self.presets or (DEFAULT,)):
+            request = Task(dataset, config=config, train=self.train, preset=preset).request("metrics")
+            yield from _keys(build(close_ranges(request, store)), digests, by_label)
 
 
 def _label(label: Mapping[str, str]) -> Label:

@@ -68,6 +68,10 @@ def cache_gc(
     config: Annotated[
         list[Path] | None, typer.Option("--config", help="Settings of the runs to keep, a TOML file; may be repeated.")
     ] = None,
+    preset: Annotated[
+        list[str] | None,
+        typer.Option("--preset", help="The runs to keep have this preset [default: paper]; may be repeated."),
+    ] = None,
     train: Annotated[bool, typer.Option("--train", help="The runs to keep have --train.")] = False,
     unused_for: Annotated[
         str | None,
@@ -94,7 +98,7 @@ def cache_gc(
     """
     from semidense.pipeline.cli.commands.cache.cleaning import Wish, clean
 
-    wish = Wish(tuple(keep or ()), tuple(config or ()), train, unused_for, max_size)
+    wish = Wish(tuple(keep or ()), tuple(config or ()), tuple(preset or ()), train, unused_for, max_size)
     clean(cache, wish, yes=yes, as_json=as_json)
 
 

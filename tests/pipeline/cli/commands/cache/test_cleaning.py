@@ -24,8 +24,8 @@ def keys_of(result: Result) -> set[str]:
     return {each.key for each in result.made.values()}
 
 
-def kept(store: Store) -> frozenset[str] | None:
-    return Wish(keep=(TEST_ONLY,)).limits(str(store.root)).keep
+def kept(store: Store, *presets: str) -> frozenset[str] | None:
+    return Wish(keep=(TEST_ONLY,), presets=presets).limits(str(store.root)).keep
 
 
 def test_what_the_dataset_reaches_is_kept_and_nothing_else(made: Result) -> None:
@@ -33,6 +33,14 @@ def test_what_the_dataset_reaches_is_kept_and_nothing_else(made: Result) -> None
         kept(made.store) == keys_of(made) == {each.key for each in status(Task(TEST_ONLY), cache=made.store.root).steps}
     )
     assert len(list(made.store.entries())) == len(keys_of(made)) + 2, "the map and the figures of another R"
+
+
+def test_a_preset_is_kept_if_it_is_named(made: Result, tmp_path: Path) -> None:
+    store = copied(made, tmp_path)
+    robust = run(Task(TEST_ONLY, cache=store.root, preset="robust"))
+    assert not keys_of(robust) <= (kept(store) or frozenset())
+    assert kept(store, "robust") == keys_of(robust)
+    assert kept(store, "paper", "robust") == keys_of(made) | keys_of(robust)
 
 
 def test_what_is_below_a_damaged_entry_is_kept(made: Result, tmp_path: Path) -> None:

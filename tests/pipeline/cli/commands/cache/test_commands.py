@@ -43,6 +43,8 @@ def test_entries_are_listed_and_chosen(invoke: Invoke, filled: Store) -> None:
         (["gc", "--max-size", "10"], ["--max-size '10'", "20GB"]),
         (["gc", "--keep", "motorcycl"], ["did you mean motorcycle?"]),
         (["gc", "--train"], ["--keep DATASET"]),
+        (["gc", "--preset", "robust"], ["--keep DATASET"]),
+        (["gc", "--keep", "motorcycle", "--preset", "robst"], ["did you mean robust?"]),
         (["import", "/none/x.tar"], ["/none/x.tar", "cannot be read"]),
         (["export", "/none/x.tar"], ["cannot write", "/none/x.tar"]),
     ],
