@@ -18,6 +18,7 @@ from benchmarks import (
     cost_volume,
     domains,
     growth,
+    held_out,
     low_rank,
     many_scenes,
     memory,
@@ -30,6 +31,7 @@ from benchmarks import (
     workers,
 )
 from benchmarks.harness import Ratio, as_command, compare
+from semidense.cache import Store
 from semidense.datasets import open_dataset, write_pfm
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.plan.errors import UsageError
@@ -186,6 +188,18 @@ def test_ways_of_training_are_judged_on_scenes_held_out(tmp_path: Path, capsys: 
     found = json.loads((tmp_path / "build" / "bench" / "recipe.json").read_text())
     assert (found["held"], found["scenes"], len(found["variants"])) == (["train-0"], 1, 3)
     assert all(0 < each["raw_bad"]["train-0"] <= 100 for each in found["variants"].values())
+
+
+def test_settings_of_the_sums_are_judged_on_scenes_that_no_network_has_seen(tmp_path: Path) -> None:
+    few = " ".join((*SETTINGS, "descriptor_net.summed_steps=0", "descriptor_net.width=32"))
+    variants = [f"{few} aggregated.median={side}" for side in (1, 3)]
+    held_out.main([SPEC], variants, cache=tmp_path / "cache")
+    found = json.loads((tmp_path / "build" / "bench" / "held_out.json").read_text())
+    plain, smooth = (found["variants"][variant][SPEC] for variant in variants)
+    assert [*plain] == [*smooth] == ["train-0", "train-1"] and plain != smooth
+    assert all(100 >= errors[0] >= errors[1] >= errors[2] >= errors[3] >= 0 for errors in plain.values())
+    keys = {entry.key for entry in Store(tmp_path / "cache").entries() if entry.label["product"] == "descriptor_net"}
+    assert len(keys) == 2  # a half each: the second variant takes the first one's volumes
 
 
 def test_siblings_of_what_is_held_out_are_not_learnt_from() -> None:
