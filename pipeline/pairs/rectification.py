@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.datasets.errors import CalibrationError
+from semidense.datasets.formats.calibration.cameras import MILLIMETRES, Cameras, calibrated
 from semidense.datasets.formats.calibration.markup import markup_values
 from semidense.datasets.formats.calibration.text import Matrix, matrix, read_text
 from semidense.datasets.formats.images import read_image
@@ -35,6 +36,8 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
 """Names in lower case under which people store camera matrices and distortions."""
 _DISTORTIONS = (4, 5, 8, 12, 14)
 """Numbers of coefficients that OpenCV's models have."""
+_TURNED = 0.01
+"""Largest entry by which a rotation times its transpose may differ from the identity: files round."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,21 +67,26 @@ def read_rig(files: Sequence[Path], size: tuple[int, int], alpha: float = 0.0) -
         alpha: with ``R T``: 0 shows only pixels that both lenses saw, 1 keeps every pixel.
 
     Raises:
-        CalibrationError: if a matrix is missing or not valid, or the file is of images of another size.
+        CalibrationError: if a matrix is missing or not valid, the cameras do not stand side by side, or the file is of
+            images of another size.
     """
     path, values = files[0], _values(files)
     _require_size(path, values, size)
-    cameras = _matrix(path, values, "m1", (3, 3)), _matrix(path, values, "m2", (3, 3))
+    cameras = _camera(path, values, "m1"), _camera(path, values, "m2")
     distortions = _distortion(path, values, "d1"), _distortion(path, values, "d2")
     if {"r1", "r2", "p1", "p2"} <= values.keys():
-        rotations = _matrix(path, values, "r1", (3, 3)), _matrix(path, values, "r2", (3, 3))
-        return StereoRig(
-            cameras, distortions, rotations, (_matrix(path, values, "p1", (3, 4)), _matrix(path, values, "p2", (3, 4)))
-        )
-    if not {"r", "t"} <= values.keys():
+        rotations = _rotation(path, values, "r1"), _rotation(path, values, "r2")
+        projections = _matrix(path, values, "p1", (3, 4)), _matrix(path, values, "p2", (3, 4))
+        rig = StereoRig(cameras, distortions, rotations, projections)
+    elif {"r", "t"} <= values.keys():
+        pose = _rotation(path, values, "r"), _matrix(path, values, "t", (3, 1))
+        if not pose[1].any():
+            raise CalibrationError(f"{path}: T is 0: both cameras would stand in one place")
+        rig = _rectified(cameras, distortions, pose, size, alpha)
+    else:
         raise CalibrationError(f"{path}: neither R and T nor R1, R2, P1 and P2; save what cv2.stereoCalibrate gives")
-    pose = _matrix(path, values, "r", (3, 3)), _matrix(path, values, "t", (3, 1))
-    return _rectified(cameras, distortions, pose, size, alpha)
+    calibrated(Cameras(path, *rig.projections, unit="m"))  # what match would refuse later is refused here
+    return rig
 
 
 def _values(files: Sequence[Path]) -> dict[str, Any]:
@@ -120,12 +128,16 @@ def rectify_files(
 ) -> list[Path]:
     """Rectify two files; write ``left.png``, ``right.png``, ``calibration.json`` and a record, and return their paths.
 
-    ``pipeline match left.png right.png --calib calibration.json`` takes what is written.
+    ``pipeline match left.png right.png --calib calibration.json`` takes what is written, with ``--unit`` if
+    none was given here.
 
     Raises:
         DatasetError, CalibrationError: if a view or the calibration cannot be read.
-        UsageError: if the views differ in size, OpenCV is missing, or a file of somebody else would be replaced.
+        UsageError: if the views differ in size, the unit is not known, OpenCV is missing, or a file of somebody else
+            would be replaced.
     """
+    if unit not in (None, *MILLIMETRES):
+        raise UsageError(f"unit {unit!r} of length is not known; give mm, cm or m")
     views = read_image(left), read_image(right)
     size = (views[0].shape[0], views[0].shape[1])
     if views[1].shape[:2] != size:
@@ -155,12 +167,29 @@ def _matrix(path: Path, values: Mapping[str, Any], name: str, shape: tuple[int, 
     return matrix(path, name.upper(), found, shape)
 
 
+def _camera(path: Path, values: Mapping[str, Any], name: str) -> Matrix:
+    found = _matrix(path, values, name, (3, 3))
+    if not (found[0, 0] > 0 and found[1, 1] > 0 and (found[2] == (0, 0, 1)).all()):
+        raise CalibrationError(f"{path}: {name.upper()} is no camera matrix: fx 0 cx, 0 fy cy, 0 0 1, in pixels")
+    return found
+
+
+def _rotation(path: Path, values: Mapping[str, Any], name: str) -> Matrix:
+    found = _matrix(path, values, name, (3, 3))
+    if np.abs(found @ found.T - np.eye(3)).max() > _TURNED or np.linalg.det(found) < 0:
+        raise CalibrationError(f"{path}: {name.upper()} is no rotation: its rows are not at right angles, of length 1")
+    return found
+
+
 def _distortion(path: Path, values: Mapping[str, Any], name: str) -> Matrix:
     """Return the coefficients of a lens; without any, it does not distort."""
     found = _value(values, name)
     if found is None:
         return np.zeros((1, 5))
-    count = np.size(np.asarray(found)) if isinstance(found, list) else 0
+    try:
+        count = np.asarray(found, np.float64).size if isinstance(found, list) else 0
+    except (ValueError, TypeError):
+        raise CalibrationError(f"{path}: {name.upper()} holds something else than numbers") from None
     if count not in _DISTORTIONS:
         raise CalibrationError(
             f"{path}: {name.upper()} has {count} coefficients; OpenCV's models have 4, 5, 8, 12 or 14 "
@@ -177,11 +206,19 @@ def _value(values: Mapping[str, Any], name: str) -> object:
 
 def _require_size(path: Path, values: Mapping[str, Any], size: tuple[int, int]) -> None:
     told = tuple(values.get(name) for name in ("image_height", "image_width"))
-    if None not in told and [str(each) for each in told] != [str(each) for each in size]:
+    if None not in told and [_number(each) for each in told] != [*size]:
         raise CalibrationError(
             f"{path}: it is of images of {told[0]} x {told[1]} pixels, these have {size[0]} x {size[1]}; "
             "calibrate with images of this size"
         )
+
+
+def _number(told: object) -> float | None:
+    """Return a number that a file may hold as a text; None if it is none."""
+    try:
+        return float(str(told))
+    except ValueError:
+        return None
 
 
 def _opencv() -> Any:  # noqa: ANN401

@@ -48,4 +48,5 @@ def rectify(
         return
     for file in files:
         typer.echo(f"wrote {file}")
-    typer.echo(f"next: pipeline match {files[0]} {files[1]} --calib {files[2]} -o DIR")
+    told = "" if unit else " --unit UNIT"
+    typer.echo(f"next: pipeline match {files[0]} {files[1]} --calib {files[2]}{told} -o DIR")

@@ -12,6 +12,7 @@ from PIL import Image
 from semidense.datasets import open_dataset, read_image
 from semidense.datasets.errors import CalibrationError
 from semidense.datasets.formats.calibration.reading import read_cameras
+from semidense.pipeline.cli.commands.rectify import rectify
 from semidense.pipeline.pairs.rectification import rectify_files
 from semidense.pipeline.plan.errors import UsageError
 
@@ -155,6 +156,61 @@ def test_a_calibration_of_another_size_is_refused(taken: Path, tmp_path: Path) -
     (tmp_path / "c.json").write_text(json.dumps(told))
     with pytest.raises(CalibrationError, match="480 x 640 pixels"):
         rectify_files(taken / "left.png", taken / "right.png", [tmp_path / "c.json"], tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"T": [[0], [0], [0]]}, "T is 0"),
+        ({"T": [[0], [-1], [0]]}, "one above the other"),
+        ({"T": [[1], [0], [0]]}, "right camera"),
+        ({"R": np.zeros((3, 3)).tolist()}, "R is no rotation"),
+        ({"R": np.diag([1, 1, -1]).tolist()}, "R is no rotation"),
+        ({"M1": np.zeros((3, 3)).tolist()}, "M1 is no camera matrix"),
+        ({"D1": [[0, 0], [0]]}, "D1 holds something else than numbers"),
+        ({"D2": ["a", "b", "c", "d"]}, "D2 holds something else than numbers"),
+        ({"image_width": "wide", "image_height": 3}, "3 x wide|wide"),
+    ],
+)
+def test_cameras_that_cannot_be_are_refused_before_anything_is_written(
+    taken: Path, tmp_path: Path, given: dict[str, object], words: str
+) -> None:
+    camera = plain(read_image(taken / "left.png").shape[:2])
+    told = {name: value.tolist() for name, value in values(camera, [np.eye(3), np.eye(3)]).items()}
+    (tmp_path / "c.json").write_text(json.dumps(told | given))
+    with pytest.raises(CalibrationError, match=words):
+        rectify_files(taken / "left.png", taken / "right.png", [tmp_path / "c.json"], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_projections_that_no_camera_has_are_refused(taken: Path, tmp_path: Path) -> None:
+    camera = plain(read_image(taken / "left.png").shape[:2])
+    none = np.zeros((3, 4))
+    write(tmp_path / "c.yml", {"M1": camera, "M2": camera, "R1": np.eye(3), "R2": np.eye(3), "P1": none, "P2": none})
+    with pytest.raises(CalibrationError, match=r"c\.yml"):
+        rectify_files(taken / "left.png", taken / "right.png", [tmp_path / "c.yml"], tmp_path / "out")
+
+
+def test_a_size_may_be_stored_as_a_float(taken: Path, tmp_path: Path) -> None:
+    rows, columns = read_image(taken / "left.png").shape[:2]
+    told = {name: value.tolist() for name, value in values(plain((rows, columns)), [np.eye(3), np.eye(3)]).items()}
+    (tmp_path / "c.json").write_text(json.dumps(told | {"image_width": float(columns), "image_height": float(rows)}))
+    assert rectify_files(taken / "left.png", taken / "right.png", [tmp_path / "c.json"], tmp_path / "out")
+
+
+def test_a_unit_that_match_would_refuse_is_refused(taken: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="unit 'parsec'"):
+        rectify_files(taken / "left.png", taken / "right.png", [taken / "stereo.yml"], tmp_path / "out", "parsec")
+
+
+def test_the_next_command_asks_for_a_unit_that_was_not_given(
+    taken: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    views = taken / "left.png", taken / "right.png"
+    rectify(*views, [taken / "stereo.yml"], tmp_path / "a")
+    assert "--unit UNIT -o DIR" in capsys.readouterr().out
+    rectify(*views, [taken / "stereo.yml"], tmp_path / "b", unit="mm")
+    assert "--unit" not in capsys.readouterr().out
 
 
 def test_the_views_are_not_overwritten(taken: Path) -> None:
