@@ -149,8 +149,10 @@ def _tracked(
         moved: (match, 2) by how much they moved, to 2 px.
 
     Returns:
-        (match, 2) the moves, and (match,) which of them can be believed.
+        (match, 2) the moves, and (match,) which of them can be believed: none in views with no room for a patch.
     """
+    if min(left.shape) <= 2 * _RADIUS:
+        return moved, np.zeros(len(moved), bool)
     views = [gaussian_filter(view.astype(np.float32), _BLUR, mode="nearest") for view in (left, right)]
     side = np.arange(-_RADIUS, _RADIUS + 1)
     around = np.stack(np.meshgrid(side, side, indexing="ij")).reshape(2, 1, -1)

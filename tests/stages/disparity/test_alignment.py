@@ -143,3 +143,10 @@ def test_an_offset_tells_where_it_was_measured() -> None:
     found = offsets(left, right, compute_survey(SURVEY, {"images": given}))  # type: ignore[typeddict-item]
     assert found.shape[1] == 3 and np.quantile(np.abs(found[:, 2] - 0.5), 0.99) < 0.1
     assert found[:, 1].max() <= SIZE[1] - 9 + 1  # columns of the right view, 9 px further left
+
+
+@pytest.mark.parametrize("shape", [(1, 60), (60, 1), (1, 1), (10, 3000)])
+def test_views_without_room_for_a_patch_stay_as_they_are(shape: tuple[int, int]) -> None:
+    view = np.random.default_rng(0).integers(0, 256, shape, np.uint8)
+    made = aligned({"left": view[..., None], "right": view[..., None]})
+    assert not offset_of(made).any() and len(made["offsets"]) == 0
