@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
@@ -205,7 +206,7 @@ def _metric_rows(plan: Plan, store: Store, made: Mapping[str, Made]) -> Iterator
 def sweep(
     dataset: Data | Task = "motorcycle",
     R: str | float | Sequence[float] = "0.05:0.95:0.05",
-    over: Mapping[str, Sequence[object]] | Sequence[str] = (),
+    over: Mapping[str, object] | Sequence[str] = (),
     *,
     watch: Watch | None = None,
     scheduler: str | None = None,
@@ -230,9 +231,7 @@ def sweep(
     return carry_out(task, sweep_request(task, R, over), (), watch, scheduler, workers)
 
 
-def sweep_request(
-    task: Task, R: str | float | Sequence[float], over: Mapping[str, Sequence[object]] | Sequence[str]
-) -> Request:
+def sweep_request(task: Task, R: str | float | Sequence[float], over: Mapping[str, object] | Sequence[str]) -> Request:
     """Return the request of a sweep; see ``sweep``."""
     thresholds = [f"semidense.R={value!r}" for value in parse_thresholds(R)]
     variants = [
@@ -241,11 +240,16 @@ def sweep_request(
     return task.request("metrics", variants)
 
 
-def _combined(over: Mapping[str, Sequence[object]] | Sequence[str]) -> list[list[str]]:
+def _combined(over: Mapping[str, object] | Sequence[str]) -> list[list[str]]:
     """Return each swept setting as one text a value."""
     if isinstance(over, Mapping):
-        return [[f"{name}={value_text(name, value)}" for value in values] for name, values in over.items()]
+        return [[f"{name}={value_text(name, value)}" for value in _several(values)] for name, values in over.items()]
     return [alternatives(setting) for setting in over]
+
+
+def _several(values: object) -> Sequence[object]:
+    """Return the values of a setting that is swept; one that stands alone, as one."""
+    return values if isinstance(values, Sequence) and not isinstance(values, str) else [values]
 
 
 def parse_thresholds(R: str | float | Sequence[float]) -> list[float]:
@@ -258,7 +262,7 @@ def parse_thresholds(R: str | float | Sequence[float]) -> list[float]:
     [0.1, 0.2, 0.3]
     """
     try:
-        R = [R] if isinstance(R, int | float) else R
+        R = [float(R)] if isinstance(R, int | float | Real) else R
         values = _span(R) if isinstance(R, str) and ":" in R else _list(R)
     except ValueError:
         raise UsageError(f"R = {shortened(R)}: write a number, numbers with commas, or first:last:step") from None

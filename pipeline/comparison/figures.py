@@ -49,7 +49,7 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 
     for method in means if len(scenes) > 1 else ():
         values = [row[figure] for row in rows if row["method"] == method and figure in row]
         axes.plot(values, [method] * len(values), "o", color=BLUE, markersize=4, label="a scene")
-    optimal = next(iter(means.values())).get("auc_optimal")
+    optimal = next((row["auc_optimal"] for row in means.values() if "auc_optimal" in row), None)
     if optimal is not None:
         axes.axvline(optimal, color=RED, linestyle="--", label="area of a perfect order")
     axes.invert_yaxis()
@@ -79,8 +79,7 @@ def density_figure(means: Sequence[Row]) -> Figure:
     drawn = new_figure("Error versus invalid pixels")
     drawn.set_size_inches(9.5, 6)
     axes = drawn.subplots()
-    ours = [row for row in means if row["experiment"] == "curve"]
-    curve = [row for row in ours if "bad" in row]
+    curve = [row for row in means if row["experiment"] == "curve" and "bad" in row]
     axes.plot([row["invalid"] for row in curve], [row["bad"] for row in curve], color=BLUE, linewidth=2)
     axes.lines[0].set_label(f"{METHOD}, over R")
     for row in curve:
@@ -88,7 +87,8 @@ def density_figure(means: Sequence[Row]) -> Figure:
             place = row["invalid"], row["bad"]
             axes.plot(*place, ".", color=BLUE, markersize=9)
             axes.annotate(f"R = {row['R']:g}", place, xytext=(6, 6), textcoords="offset points", fontsize="small")
-    mask, threshold, scenes = ours[0]["mask"], ours[0]["threshold_px"], ours[0]["scene"]
+    judged = next((row for row in means if row["experiment"] == "curve"), means[0])
+    mask, threshold, scenes = judged["mask"], judged["threshold_px"], judged["scene"]
     others = [row for row in means if row["experiment"] == "density" and "bad" in row and "R" not in row]
     draw_matchers(axes, [row for row in others if row["scene"] == scenes])
     axes.set_xlabel(f"invalid: {mask} pixels without a disparity (%), {scenes} scenes")

@@ -1,6 +1,6 @@
 """Match a user's own pair: ``pipeline.match``, and what comes back from it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
@@ -19,6 +19,7 @@ from semidense.pipeline.api import Task, run, status
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import findings, without_texture
 from semidense.pipeline.pairs.wishes import Wishes
+from semidense.pipeline.plan.config import Config, Settings
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.presets import OWN_PAIRS
@@ -26,7 +27,9 @@ from semidense.pipeline.plan.shipped_weights import weights_of
 from semidense.pipeline.plan.steps import SPLIT
 from semidense.pipeline.results.result import Result
 from semidense.stages.disparity import depth as geometry
+from semidense.stages.disparity.declaration import AggregatedParams, DisparityParams
 from semidense.stages.evaluation.calibration.table import Outcome, Table, outcome
+from semidense.stages.evaluation.filtering import SemidenseParams
 
 Unit = Literal["mm", "cm", "m"]
 
@@ -54,12 +57,12 @@ class Match:
 
     @cached_property
     def raw(self) -> NDArray[np.float32]:
-        """(y, x) float32, px: the winner-take-all map before anything was dropped."""
+        """(y, x) float32, px: the map before anything was dropped."""
         return self._array("disparity", "disparity")
 
     @cached_property
     def confidence(self) -> NDArray[np.float32]:
-        """(y, x) float32 in [0, 1]: how sure the evaluation-Net is of ``raw``; calibrated, if that was asked for."""
+        """(y, x) float32 in [0, 1]: how sure it is that ``raw`` is right; calibrated, if that was asked for."""
         return self._array(self.wishes.confidence, "confidence")
 
     @cached_property
@@ -119,14 +122,19 @@ class Match:
         """The least confidence that was kept."""
         return float(self._array("semidense", "R")[0])
 
+    @property
+    def filtered_by(self) -> Mapping[str, Any]:
+        """The settings of the filter, whether they were wishes or not."""
+        return self.made("semidense").step.settings
+
     @cached_property
     def basis(self) -> Outcome | None:
         """What the wanted error came to in training scenes; None without one, or if the confidence needs no table."""
-        found = self._find("calibration")
-        if self.wishes.max_error is None or found is None:
+        found, wanted = self._find("calibration"), self.filtered_by.get("max_error")
+        if wanted is None or found is None:
             return None
         calibration = self.result.store.read(found.key)
-        return outcome(Table.of(calibration), calibration["log_odds"], self.wishes.max_error, calibration["tolerance"])
+        return outcome(Table.of(calibration), calibration["log_odds"], wanted, calibration["tolerance"])
 
     @property
     def expected_error(self) -> float | None:
@@ -209,7 +217,7 @@ def match(
     d_max: int | None = None,
     calib: str | PathLike[str] | Sequence[str | PathLike[str]] = (),
     unit: Unit | None = None,
-    settings: Sequence[str] = (),
+    settings: Settings = (),
     preset: str = OWN_PAIRS,
     cache: Path | str | None = None,
     watch: Watch | None = None,
@@ -237,11 +245,11 @@ def match(
     """
     files = [calib] if isinstance(calib, str | PathLike) else calib
     options = PairOptions(tuple(fspath(file) for file in files), unit, d_min, d_max)
-    task = Task(_dataset(left, right, options), settings=tuple(settings), cache=cache, preset=preset)
-    found = match_all(task, Wishes(**wishes), watch=watch, workers=workers)
-    if len(found) != 1:
-        raise UsageError(f"{left} and {right} are {len(found)} pairs; match one at a time, or use `pipeline match`")
-    return found[0]
+    dataset = _dataset(left, right, options)
+    if (count := len(dataset.scenes)) != 1:
+        raise UsageError(f"{left} and {right} are {count} pairs; match one at a time, or use `pipeline match`")
+    task = Task(dataset, settings=settings, cache=cache, preset=preset)
+    return match_all(task, Wishes(**wishes), watch=watch, workers=workers)[0]
 
 
 def _dataset(left: object, right: object, options: PairOptions) -> Dataset:
@@ -253,15 +261,26 @@ def _dataset(left: object, right: object, options: PairOptions) -> Dataset:
 def wished(task: Task, wishes: Wishes) -> Task:
     """Return the task with the settings that the wishes come down to, checked before any image is read.
 
+    A map whose disparities lie below a pixel already is not refined again.
+
     Raises:
         UsageError: if a setting is not valid.
         StageError: if the wishes need a calibration, and none is known for such maps.
     """
     task = task.and_settings(wishes.settings)
     config = task.configuration()
-    if (wishes.calibrated or wishes.max_error is not None) and not config.choice("use", "calibrated_confidence"):
+    filtered_by = config.of("semidense", SemidenseParams)
+    calibrated = filtered_by.calibrated or filtered_by.max_error is not None
+    if calibrated and not config.choice("use", "calibrated_confidence"):
         weights_of(config, "calibration")
-    return task
+    return task.and_settings(["refined.subpixel=false"]) if wishes.subpixel and _below_a_pixel(config) else task
+
+
+def _below_a_pixel(config: Config) -> bool:
+    """Return whether the raw map is refined where its winner is found."""
+    if config.choice("use", "disparity") == "aggregated":
+        return config.of("aggregated", AggregatedParams).subpixel
+    return config.of("disparity", DisparityParams).subpixel
 
 
 def match_all(

@@ -205,10 +205,9 @@ class _Writer:
 
 def _basis(match: Match) -> dict[str, Any]:
     """Return where R comes from; for a wanted error, what to expect and what it came to in training scenes."""
-    if match.wishes.max_error is None:
-        return {
-            "R_from": "from the pair's own confidences, for the density asked for" if match.wishes.density else "as set"
-        }
+    if match.filtered_by.get("max_error") is None:
+        own = "from the pair's own confidences, for the density asked for"
+        return {"R_from": "as set" if match.filtered_by.get("density") is None else own}
     expected = match.expected_error
     words = "no pixel is sure enough for that error" if expected is None else f"R = {told(match.R)}"
     return {

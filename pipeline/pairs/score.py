@@ -5,18 +5,21 @@ from dataclasses import replace
 from functools import cached_property
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from semidense.datasets import Dataset, DisparityRange, open_dataset
 from semidense.datasets.pairs.arrays import array_pair
 from semidense.datasets.pairs.options import PairOptions, pair_spec
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.execution.watch import Watch
-from semidense.pipeline.pairs.match import Match
+from semidense.pipeline.pairs.match import Match, Unit
 from semidense.pipeline.pairs.wishes import Wishes
+from semidense.pipeline.plan.config import Settings
+from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.presets import FOREIGN
 
-Unit = Literal["mm", "cm", "m"]
+_WISHES = ("R", "density", "max_error")
+"""What can be wished of a map that is there: it is filtered, and nothing else."""
 
 
 class Score(Match):
@@ -60,7 +63,7 @@ def score(
     none: float | None = None,
     calib: str | PathLike[str] | Sequence[str | PathLike[str]] = (),
     unit: Unit | None = None,
-    settings: Sequence[str] = (),
+    settings: Settings = (),
     cache: Path | str | None = None,
     watch: Watch | None = None,
     workers: int | None = None,
@@ -80,15 +83,17 @@ def score(
         cache: the cache's folder.
         watch: told how it goes on.
         workers: threads; None for one a core.
-        **wishes: ``R``, ``density`` or ``max_error``; see `Wishes`.
+        **wishes: ``R``, ``density`` or ``max_error``; see `Wishes`, whose other attributes are for `match` alone.
 
     Raises:
         UsageError, DatasetError, CacheError, StageError: what the user can mend, in one line.
     """
+    if beyond := [name for name in wishes if name not in _WISHES]:
+        raise UsageError(f"score takes no {beyond[0]}; it takes {', '.join(_WISHES)}, one of them")
     files = [calib] if isinstance(calib, str | PathLike) else calib
     options = PairOptions(tuple(fspath(file) for file in files), unit, scale=scale, none=none)
     dataset = _dataset(left, disparity, right, options)
-    task = Task(dataset, settings=tuple(settings), cache=cache, preset=FOREIGN)
+    task = Task(dataset, settings=settings, cache=cache, preset=FOREIGN)
     return score_one(task, Wishes(**wishes), watch=watch, workers=workers)
 
 

@@ -18,7 +18,7 @@ class Wishes:
         within: error up to which these two count a disparity as right, px; None for the configuration's.
         left_right: drop what the right view's map contradicts by more than ``tolerance`` px.
         tolerance: px.
-        subpixel: move each disparity to the parabola's lowest point.
+        subpixel: move each whole disparity to the parabola's lowest point; maps that lie below a pixel already stay.
         fill: fill the holes with the background; the map is dense then, and partly guessed.
         right_view: make the right view's raw map too.
     """

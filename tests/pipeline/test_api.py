@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from semidense.pipeline import api
-from semidense.pipeline.api import Task, open_store, parse_thresholds
+from semidense.pipeline.api import Task, open_store, parse_thresholds, sweep_request
 from semidense.pipeline.plan.config import Settings
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.opening import open_product, recorded
 from semidense.pipeline.results.result import Result
+from tests.tiny import SPEC
 
 MakePair = Callable[[Path], Path]
 
@@ -29,6 +30,16 @@ MakePair = Callable[[Path], Path]
 )
 def test_thresholds_are_read(text: str, values: list[float]) -> None:
     assert parse_thresholds(text) == values
+
+
+def test_a_value_that_stands_alone_is_swept_as_one() -> None:
+    assert parse_thresholds(np.float32(0.5)) == parse_thresholds(0.5) == [0.5]  # type: ignore[arg-type]
+    assert parse_thresholds(np.int64(1)) == [1]  # type: ignore[arg-type]
+    one, other = (
+        sweep_request(Task(SPEC), 0.5, {"costvolume.mode": value, "channels.rank_window": 15})
+        for value in ("fast", ["fast"])
+    )
+    assert [*one.configs] == [*other.configs]
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from semidense import pipeline
 from semidense.datasets import open_dataset, read_pfm, write_pfm
 from semidense.pipeline.api import Task
 from semidense.pipeline.comparison.experiments import compare
+from semidense.pipeline.plan.errors import UsageError
 from semidense.stages.evaluation.filtering import keep_confident
 from semidense.stages.stage import StageError
 from tests.tiny import TEST_ONLY
@@ -93,6 +94,12 @@ def test_arrays_are_scored_as_files_are(folder: Path) -> None:
 def test_a_wanted_error_needs_no_calibration(folder: Path) -> None:
     found = pipeline.score(folder / "left.png", folder / "map.pfm", cache=folder / "cache", max_error=0.3)
     assert found.basis is None and (found.expected_error is None or found.expected_error <= 0.3)
+
+
+@pytest.mark.parametrize("wish", ["right_view", "subpixel", "calibrated", "sharpness"])
+def test_what_score_does_not_offer_is_refused(folder: Path, wish: str) -> None:
+    with pytest.raises(UsageError, match=f"score takes no {wish}; it takes R, density, max_error"):
+        pipeline.score(folder / "left.png", folder / "map.pfm", cache=folder / "cache", **{wish: True})
 
 
 def test_without_a_right_view_what_needs_it_is_refused(folder: Path) -> None:

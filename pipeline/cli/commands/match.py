@@ -151,12 +151,11 @@ def match(
 
 
 def _plan(task: "Task", wishes: "Wishes", as_json: bool) -> None:
-    from dataclasses import replace
-
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
+    from semidense.pipeline.pairs.match import wished
 
-    plan = api.status(replace(task, settings=(*task.settings, *wishes.settings)), wishes.product)
+    plan = api.status(wished(task, wishes), wishes.product)
     console.show_plan(plan, api.open_store(task.cache), as_json)
 
 

@@ -43,6 +43,17 @@ def test_a_method_that_lacks_a_scene_has_dots_and_no_bar() -> None:
     assert list(axes.lines[2].get_xdata()) == pytest.approx([0.15, 0.15])
 
 
+def test_the_perfect_order_is_drawn_though_the_first_method_lacks_a_scene() -> None:
+    rows = [row("auc", scene, "ours", auc=0.2, auc_optimal=0.1) for scene in "ab"]
+    axes = dots_figure([row("auc", "a", "other", auc=0.3, auc_optimal=0.1), *rows], "auc", title="Areas").axes[0]
+    assert [list(line.get_xdata()) for line in axes.lines][-1] == pytest.approx([0.1, 0.1])
+
+
+def test_no_curve_is_drawn_where_no_pixel_counts() -> None:
+    axes = density_figure(mean_rows([row("density", "a", "other", pixels=0)])).axes[0]
+    assert axes.get_xlabel() == "invalid: nonocc pixels without a disparity (%), mean of 1 scenes"
+
+
 def test_the_bars_name_their_mask_and_threshold() -> None:
     rows = [row("auc", scene, "ours", auc=0.2) for scene in "ab"]
     label = dots_figure(rows, "auc", title="Areas").axes[0].get_xlabel()

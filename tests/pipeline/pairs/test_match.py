@@ -1,6 +1,7 @@
 """A user's own pair through ``pipeline.match``, with the shipped weights on a few pixels."""
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +19,7 @@ from semidense.datasets import DatasetError, open_dataset, read_pfm, read_png16
 from semidense.datasets.pairs.options import PairOptions, pair_spec
 from semidense.pipeline.api import Task, run, status
 from semidense.pipeline.pairs.match import Match, match, match_all
-from semidense.pipeline.pairs.match_files import save, save_all
+from semidense.pipeline.pairs.match_files import save, save_all, summary
 from semidense.pipeline.pairs.wishes import Wishes
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.presets import PRESETS
@@ -319,6 +320,39 @@ def test_a_match_on_a_cluster_is_surveyed_there_too(folder: Path, monkeypatch: p
 def test_two_folders_are_not_one_pair(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="no such file or folder"):
         match(tmp_path / "none", folder / "right.png")
+
+
+def test_folders_of_several_pairs_are_refused_before_any_is_matched(folder: Path, tmp_path: Path) -> None:
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        for name in ("a.png", "b.png"):
+            shutil.copy(folder / f"{side}.png", tmp_path / side / name)
+    with pytest.raises(UsageError, match="are 2 pairs"):
+        match(tmp_path / "left", tmp_path / "right", d_max=8, cache=tmp_path / "cache")
+    assert not (tmp_path / "cache").exists()
+
+
+def test_settings_may_be_a_mapping_and_their_wishes_are_told(folder: Path) -> None:
+    files = folder / "left.png", folder / "right.png"
+    one, other = (
+        match(*files, calib=folder / "calib.txt", cache=folder / "cache", **how)
+        for how in ({"settings": {"semidense.max_error": 0.1}}, {"max_error": 0.1})
+    )
+    assert np.array_equal(one.disparity, other.disparity, equal_nan=True)
+    told = summary(one)
+    assert (told["R_from"], told["R_basis"]) == ("for the error asked for", summary(other)["R_basis"])
+    half = match(*files, calib=folder / "calib.txt", cache=folder / "cache", settings="semidense.density=0.5")
+    assert summary(half)["R_from"] == "from the pair's own confidences, for the density asked for"
+
+
+def test_a_map_below_a_pixel_is_not_refined_by_single_costs(folder: Path, found: Match) -> None:
+    files, options = (folder / "left.png", folder / "right.png"), {"calib": folder / "calib.txt"}
+    made = match(*files, **options, cache=folder / "cache", subpixel=True)
+    known = np.isfinite(made.disparity)
+    assert np.array_equal(made.disparity[known], made.raw[known])
+    whole = match(*files, **options, cache=folder / "cache", subpixel=True, settings=["aggregated.subpixel=false"])
+    known = np.isfinite(whole.disparity)
+    assert (whole.raw[known] % 1 == 0).all() and (whole.disparity[known] % 1 != 0).any()
 
 
 def test_importing_the_verb_stays_light(project: Path) -> None:
