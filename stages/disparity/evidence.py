@@ -40,7 +40,7 @@ NEAR = 1.0
 def evidence(strip: Strip, winner: NDArray[np.int32], paths: int) -> NDArray[np.float32]:
     """Return what single and aggregated costs say of each pixel.
 
-    Only cells whose right pixel is in the image count. With fewer than two minima a margin is 40, the largest.
+    Only cells whose right pixel is in the image count. A margin is at most 40, and is 40 where no cell is a rival.
 
     Args:
         strip: rows of the aggregated volume, with their single costs.

@@ -28,13 +28,18 @@ def fill_holes(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
     [[5.0, 5.0, 3.0, 3.0, 3.0], [5.0, 5.0, 3.0, 3.0, 3.0]]
     """
     require_shape("disparity", disparity, 2)
-    before, after = _carried(disparity), _carried(disparity[:, ::-1])[:, ::-1]
-    rows = np.where(np.isnan(disparity), np.fmin(before, after), disparity)
+    rows = fill_rows(disparity)
     known = np.nonzero(~np.isnan(rows).any(axis=1))[0]
     if known.size == 0:
         return disparity.copy()
     filled: NDArray[np.float32] = rows[_nearest(known, np.arange(len(rows)))]
     return filled
+
+
+def fill_rows(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return a map, (y, x), whose holes have the smaller of the disparities at their two ends; NaN in empty rows."""
+    before, after = _carried(disparity), _carried(disparity[:, ::-1])[:, ::-1]
+    return np.where(np.isnan(disparity), np.fmin(before, after), disparity)
 
 
 def _nearest(known: NDArray[np.intp], wanted: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -91,7 +91,8 @@ def threshold_for(density: float, disparity: NDArray[Any], confidence: NDArray[A
     scores = confidence[np.isfinite(disparity) & (confidence > 0)]
     if not scores.size:
         return 1.0
-    kept = min(scores.size, max(1, math.ceil(density * disparity.size)))
+    asked = math.ceil(round(density * disparity.size, 6))  # 0.07 * 100 is a little more than 7
+    kept = min(scores.size, max(1, asked))
     return float(np.partition(scores, scores.size - kept)[scores.size - kept])
 
 

@@ -24,8 +24,9 @@ def eth3d_figures(disparity: NDArray[Any], truth: NDArray[Any], mask: NDArray[np
 
     Returns:
         ``bad0.5 bad1.0 bad2.0 bad4.0``, percent of the reported pixels whose error is larger; ``avgerr rms A50 A90 A95
-        A99`` of them, px; ``coverage``, percent of the pixels that count. If none is reported, the worst there is:
-        100 % bad, infinite errors. The quantile A90 is the error number ``floor(0.9 n)`` of n in rising order, from 0.
+        A99`` of them, px; ``coverage``, percent of the pixels that count. Without a reported pixel, the worst
+        there is: 100 % bad, infinite errors. The quantile A90 is the error number ``floor(0.9 n)`` of n in rising
+        order, from 0.
 
     Raises:
         StageError: If the shapes differ, or the mask is not bool.

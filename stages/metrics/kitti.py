@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from semidense.stages.disparity.filling import fill_rows
 from semidense.stages.metrics.errors import percentage, require_equal
 
 ABSOLUTE, RELATIVE = 3.0, 0.05
@@ -34,7 +35,7 @@ def fill_background(disparity: NDArray[Any]) -> NDArray[np.float32]:
     [[5.0, 5.0, 3.0, 3.0, 3.0]]
     """
     known = np.where(np.isfinite(disparity), disparity, np.nan).astype(np.float32)
-    rows = np.where(np.isnan(known), np.fmin(_carried(known), _carried(known[:, ::-1])[:, ::-1]), known)
+    rows = fill_rows(known)
     some = np.flatnonzero(~np.isnan(rows).all(axis=1))
     if some.size:
         rows[: some[0]], rows[some[-1] + 1 :] = rows[some[0]], rows[some[-1]]
@@ -98,12 +99,6 @@ def kitti2012_figures(disparity: NDArray[Any], truth: NDArray[Any]) -> dict[str,
     out = {f"out{threshold:.0f}": percentage(error > threshold) for threshold in THRESHOLDS_2012}
     mean = float(error.mean(dtype=np.float64)) if error.size else float("nan")
     return out | {"avg": mean, "density": percentage(np.isfinite(disparity)[known])}
-
-
-def _carried(rows: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return for each pixel the last known value of its row up to it, NaN before the first."""
-    last = np.maximum.accumulate(np.where(np.isnan(rows), 0, np.arange(rows.shape[1])), axis=1)
-    return np.take_along_axis(rows, last, axis=1)
 
 
 def _count(chosen: NDArray[np.bool_]) -> int:

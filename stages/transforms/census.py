@@ -6,6 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.stages.compute.kernel import inlined, kernel
+from semidense.stages.stage import StageError, require_shape
+
+_MOST = 65
+"""Pixels of the largest window: a bit for each of them but the centre."""
 
 
 def census_transform(gray: NDArray[Any], window: tuple[int, int]) -> NDArray[np.uint64]:
@@ -18,8 +22,14 @@ def census_transform(gray: NDArray[Any], window: tuple[int, int]) -> NDArray[np.
     Returns:
         (y, x) uint64; neighbours beyond the image give 0.
 
+    Raises:
+        StageError: if ``gray`` is no (y, x), or the window is not of odd sides or too large.
+
     Source: Zabih & Woodfill, "Non-parametric local transforms for computing visual correspondence", ECCV 1994.
     """
+    require_shape("gray", gray, 2)
+    if not all(side % 2 for side in window) or window[0] * window[1] > _MOST:
+        raise StageError(f"census window {window[0]} x {window[1]}: two odd sides, at most {_MOST} pixels in all")
     signatures = np.zeros(gray.shape, np.uint64)
     _sign(np.ascontiguousarray(gray), window[0] // 2, window[1] // 2, signatures)
     return signatures
@@ -44,9 +54,15 @@ def _sign(gray: NDArray[Any], rows: int, columns: int, signatures: NDArray[np.ui
 def hamming(left: NDArray[np.uint64], right: NDArray[np.uint64]) -> NDArray[np.float32]:
     """Return the number of bits in which two arrays of signatures differ: float32, 0 to 64.
 
+    Raises:
+        StageError: if they are no (y, x) of one shape.
+
     >>> hamming(np.array([[0b1011]], np.uint64), np.array([[0b0010]], np.uint64)).tolist()
     [[2.0]]
     """
+    require_shape("signatures", left, 2)
+    if left.shape != right.shape:
+        raise StageError(f"signatures have shapes {left.shape} and {right.shape}: they must be equal")
     distance = np.empty(left.shape, np.float32)
     _count(left, right, distance)
     return distance

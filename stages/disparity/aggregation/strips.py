@@ -20,7 +20,7 @@ from semidense.stages.disparity.declaration import AggregatedParams
 from semidense.stages.stage import StageError
 
 CELLS = 1 << 26
-"""Most cells of a strip: 128 MB for its levels and as much for their sums."""
+"""Most cells of a strip: 128 MB for its levels; two passes hold four times as much at once."""
 CHUNK = 32
 """Strips begin at multiples of so many rows, the rows of a chunk of the stored volume."""
 
@@ -115,6 +115,7 @@ class _Image:
             first, _, _ = self._sums(rows, levels.above, above.pop(), front)
             costs = with_mean(levels.above, first, self.params.paths)
             sums, _, last = self._sums(rows, costs, again.pop(), last)
+            del costs  # a strip is out for as long as its caller works on it
             yield Strip(rows, levels, sums, first)
 
     def _beginning(self) -> Front:

@@ -1,8 +1,8 @@
 """Which disparities of a 4 x 4 tile can win: those that win a cheap matching at enough pixels in and around it.
 
-The cheap matching is winner-take-all over the costs of descriptors (see ``fast``). It errs more often on fine structure
-than the matching-Net does, but in or beside a tile some pixel is mostly right, and the network judges all that is
-proposed. What wins at few pixels is mostly wrong: to leave it out is worth more than the time it saves.
+The cheap matching is winner-take-all over the costs of descriptors (see ``descriptors.volume``). It errs more often on
+fine structure than the matching-Net does, but in or beside a tile some pixel is mostly right, and the network judges
+all that is proposed. What wins at few pixels is mostly wrong: to leave it out is worth more than the time it saves.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """The costs of single 4 x 4 tiles of cells, each at a disparity of its own: what the exact volume has there.
 
-In the transformed domain (see ``transformed``) a tile of the hidden layer takes four tiles of conv3, and tiles side
+In the transformed domain (see ``winograd``) a tile of the hidden layer takes four tiles of conv3, and tiles side
 by side at one disparity share them: those of a batch are made once each. With the paper's head each tile goes through
 the network's own convolutions with all the context that it needs.
 """
@@ -108,7 +108,7 @@ def _quarters(places: Places) -> tuple[Places, NDArray[np.int64]]:
 def _run(
     net: TransformedNet, left: Tensor, right: Tensor, corners: NDArray[np.int64], slots: NDArray[np.int64]
 ) -> Tensor:
-    """Return the units of the hidden layer, (4, 4 n, UNITS): as ``transformed.run_blocks``, for tiles anywhere."""
+    """Return the units of the hidden layer, (4, 4 n, UNITS): as ``winograd.volume.run_blocks``, for any tiles."""
     count, tiles = len(corners), len(slots)
     joined = torch.empty(count, 36, JOINED, dtype=net.conv3.dtype)
     products = torch.zeros(36, count, FEATURES, dtype=net.conv3.dtype)
@@ -127,7 +127,7 @@ def _run(
 
 @kernel
 def _join_each(left: Stored, right: Stored, corners: NDArray[np.int64], tiles: Stored) -> None:
-    """Join and transform the tile at each of some corners: as ``transformed.join``."""
+    """Join and transform the tile at each of some corners: as ``join`` of ``winograd.volume``."""
     size = 36 * JOINED
     for tile in range(corners.shape[0]):
         place = corners[tile, 0], corners[tile, 1], corners[tile, 2]

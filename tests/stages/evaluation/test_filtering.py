@@ -89,6 +89,13 @@ def test_a_density_keeps_the_most_confident(density: float, kept: int) -> None:
     assert made["R"][0] == np.float32([0.9, 0.5, 0.2])[kept - 1]
 
 
+@pytest.mark.parametrize(("density", "kept"), [(0.07, 7), (0.55, 55), (0.56, 56), (0.561, 57)])
+def test_a_density_is_no_pixel_more_by_rounding(density: float, kept: int) -> None:
+    confidence = np.linspace(0.1, 1, 100, dtype=np.float32).reshape(10, 10)
+    R = threshold_for(density, np.ones((10, 10), np.float32), confidence)
+    assert (confidence >= np.float32(R)).sum() == kept
+
+
 def test_pixels_that_tie_with_the_last_are_kept_too() -> None:
     ones = np.ones((2, 2), np.float32)
     assert threshold_for(0.25, ones, ones) == 1

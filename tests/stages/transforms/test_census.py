@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from semidense.stages.stage import StageError
 from semidense.stages.transforms.census import census_transform, hamming
 
 
@@ -33,3 +34,14 @@ def test_random_distances_are_those_of_python() -> None:
         [(int(a) ^ int(b)).bit_count() for a, b in zip(*rows, strict=True)] for rows in zip(left, right, strict=True)
     ]
     np.testing.assert_array_equal(hamming(left, right), expected)
+
+
+@pytest.mark.parametrize("window", [(4, 5), (5, 4), (11, 11)])
+def test_a_window_that_is_even_or_too_large_is_refused(window: tuple[int, int]) -> None:
+    with pytest.raises(StageError, match=f"window {window[0]} x {window[1]}"):
+        census_transform(np.zeros((9, 9)), window)
+
+
+def test_signatures_of_two_shapes_are_refused() -> None:
+    with pytest.raises(StageError, match=r"\(3, 4\) and \(1, 1\)"):
+        hamming(np.zeros((3, 4), np.uint64), np.zeros((1, 1), np.uint64))

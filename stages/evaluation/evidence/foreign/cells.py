@@ -27,7 +27,7 @@ class Described:
     """Both views of a block with 50 px of context all round, as descriptors: whatever its map, they are the same.
 
     Attributes:
-        left: (y + 24, x + 24, 64) float32 of unit length: the block with ``CONTEXT``.
+        left: (y + 24, x + 24, filter) float32 of unit length: the block with ``CONTEXT``.
         right: the same of the right view.
         scale: log-odds of a mismatch by which a dot product of 1 is lower than one of 0.
         bias: log-odds of a dot product of 0.
