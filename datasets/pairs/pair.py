@@ -69,7 +69,8 @@ def _listed(sides: list[str], options: PairOptions) -> list[Pair]:
         return [Pair(pair_name(each), each, each) for each in image_files(sides[0])]
     if path.suffix.lower() not in LISTS:
         raise DatasetError(
-            f"{path}: one path alone must be a list ({', '.join(LISTS)}), or both views with split=; write {PATTERN}"
+            f"{path}: the right view is missing; one file alone must hold both views (split=, --split) or be a list of "
+            f"pairs ({', '.join(LISTS)}); write {PATTERN}"
         )
     return read_list(path)
 
@@ -177,7 +178,10 @@ def _range(
         high = told - 1
     for key, value in (("d_min", low), ("d_max", high)):
         if value is not None and abs(value) >= width:
-            raise DatasetError(f"pair: {key}={value}, but the image is only {width} px wide")
+            raise DatasetError(
+                f"pair: {key}={value}, but the image is only {width} px wide: its disparities lie between {1 - width} "
+                f"and {width - 1} px"
+            )
     open_ends: list[RangeEnd] = []
     open_ends += ["minimum"] if low is None else []
     open_ends += ["maximum"] if high is None else []

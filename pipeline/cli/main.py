@@ -10,6 +10,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 import typer.core
+from typer.exceptions import TyperException
 
 from semidense.pipeline.cli.commands import compare, match, rectify, run, score, show, submit
 from semidense.pipeline.cli.commands.cache.commands import cache_app
@@ -86,7 +87,7 @@ def command() -> None:
     _leave(code)  # without this Python takes a second or more to dismantle torch and Numba
 
 
-def main() -> None:
+def main() -> NoReturn:
     """Run the command line; a user's mistake is one line and exit code 2."""
     _require_streams()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -94,9 +95,12 @@ def main() -> None:
     keep_freed_memory()
     try:
         try:
-            app(prog_name="pipeline")
+            code = app(prog_name="pipeline", standalone_mode=False)
         finally:
             sys.stdout.flush()  # what does not fit on a full disk is an error here, and not a word after the end
+    except TyperException as mistake:
+        _say_mistyped(mistake)
+        raise SystemExit(mistake.exit_code) from None
     except _Stopped as stop:
         _leave(128 + int(stop.args[0]))
     except Exception as error:
@@ -108,6 +112,14 @@ def main() -> None:
         if isinstance(error, OSError) and not isinstance(error, USER_ERRORS) and error.filename is None:
             _leave(2)  # the output is full or closed: the end of Python would try to write again, and say so at length
         raise SystemExit(2) from None
+    raise SystemExit(code if isinstance(code, int) else 0)
+
+
+def _say_mistyped(mistake: TyperException) -> None:
+    """Say in one line what is wrong with the words of a command; without any word, all of its help."""
+    told, context = mistake.format_message(), getattr(mistake, "ctx", None)
+    helps = f"; see `{context.command_path} --help`" if context else ""
+    print(told if "\n" in told else f"pipeline: {told.rstrip('.')}{helps}", file=sys.stderr)
 
 
 def _require_streams() -> None:

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -35,6 +36,19 @@ def explaining(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise UsageError(f"{path}: cannot be written ({error.strerror or error}); name another place") from error
+
+
+def require_writable(folder: Path) -> None:
+    """Refuse a folder that cannot be written, without making it: what is to be written may take long.
+
+    Raises:
+        UsageError: if it, or the nearest folder above it that there is, is a file or closed to this user.
+    """
+    place = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+    if not place.is_dir():
+        raise UsageError(f"{folder}: cannot be written ({place} is a file); name another place")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise UsageError(f"{folder}: cannot be written (no permission in {place}); name another place")
 
 
 def table_text(rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> str:

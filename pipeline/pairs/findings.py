@@ -12,6 +12,8 @@ _EQUAL = 0.99
 _NEARLY_ALL = 0.9
 _TAIL = 15
 _SILENT = 0.01
+_BEYOND = 0.05
+"""Share of the matches outside the range that was searched; it is 0.00 to 0.03 where the range is the truth's."""
 _LEAST_OFFSET = 1.0
 """A vertical offset below this does no harm: a patch is 11 px high."""
 
@@ -22,25 +24,36 @@ def findings(
     known: Calibration | None = None,
     *,
     aligned: bool = False,
+    estimated: bool = False,
 ) -> list[str]:
     """Return one line for each problem of a pair; an empty list for a sound pair.
 
     Args:
         survey: the product's arrays.
-        searched: the range of disparities that the user gave; None if an end of it is estimated.
+        searched: the range of disparities that was searched; None if it is not known.
         known: the pair's calibration: a point at infinity has the disparity ``-doffs``.
         aligned: the rows of the right view are shifted for the matching.
+        estimated: whether an end of the range was estimated.
     """
-    if survey["equal"][0] >= _EQUAL:
-        return [f"the two views are the same picture ({100 * survey['equal'][0]:.1f} % of their pixels are equal)"]
+    if same := same_picture(float(survey["equal"][0])):
+        return same
     matches = dict(zip(FIELDS, survey["matches"].T, strict=True))
     if matches["y"].size < ENOUGH:
         return [f"only {matches['y'].size} places agree between the views: are they of the same scene, and rectified?"]
     step, places = float(survey["step"][0]), survey["matches"][:, :2]
     return [
-        *_exchanged(matches["disparity"], step, searched, known.doffs if known else 0.0),
+        *(
+            [*_exchanged(matches["disparity"], step, None if estimated else searched, known.doffs if known else 0.0)]
+            or _outside(matches["disparity"], step, searched, survey["range"])
+        ),
         *(_unrectified(matches["vertical"], step, aligned) if side_by_side(places, PATCH * step) >= ENOUGH else ()),
     ]
+
+
+def same_picture(equal: float) -> list[str]:
+    """Return a line if two views are one, given the share of their pixels that are equal."""
+    told = f"the two views are the same picture ({100 * equal:.1f} % of their pixels are equal)"
+    return [told] if equal >= _EQUAL else []
 
 
 def without_texture(distinctiveness: Mapping[str, Array]) -> list[str]:
@@ -69,6 +82,21 @@ def _exchanged(disparity: Array, step: float, searched: DisparityRange | None, d
             f"left and right look exchanged: {100 * negative:.0f} % of the disparities are negative, about "
             f"{np.median(disparity):.0f} px; give the files in the other order, or, if the cameras are turned towards "
             "each other, the smallest and the largest disparity to search"
+        )
+
+
+def _outside(disparity: Array, step: float, searched: DisparityRange | None, likely: Array) -> Iterator[str]:
+    """Warn of a range that leaves out disparities which the matches have, and not only stray ones."""
+    if searched is None:
+        return
+    low, high = searched.minimum, searched.maximum
+    left_out = (disparity < low - step) | (disparity > high + step)
+    share = float(np.mean(left_out & (disparity >= likely[0]) & (disparity <= likely[1])))
+    if share >= _BEYOND:
+        yield (
+            f"{100 * share:.0f} % of the places that agree between the views lie outside of the {low} to {high} px "
+            "that were searched: there the map is wrong, and the confidence may not tell; search "
+            f"{min(low, likely[0]):.0f} to {max(high, likely[1]):.0f} px"
         )
 
 

@@ -173,8 +173,8 @@ class Match:
     @cached_property
     def misfits(self) -> list[str]:
         """Those of the warnings that tell how the views do not fit together: a picture of ``survey`` shows where."""
-        searched = None if self.scene.open_ends else self.disparities
-        return findings(self.survey, searched, self.scene.calibration, aligned=self.shifts is not None)
+        aligned, estimated = self.shifts is not None, bool(self.scene.open_ends)
+        return findings(self.survey, self.disparities, self.scene.calibration, aligned=aligned, estimated=estimated)
 
     @cached_property
     def shifts(self) -> tuple[float, float] | None:

@@ -19,7 +19,6 @@ are replaced or deleted. The pair's own files, and files that ``summary.json`` d
 """
 
 import json
-import os
 import sys
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -48,9 +47,8 @@ from semidense.pipeline.files.map_files import (
 )
 from semidense.pipeline.files.map_pictures import confidence_picture, disparity_picture
 from semidense.pipeline.files.publishing import publishing, refuse_foreign
-from semidense.pipeline.files.writing import write_rgb
+from semidense.pipeline.files.writing import require_writable, write_rgb
 from semidense.pipeline.pairs.match import Match
-from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.opening import open_product
 from semidense.stages.evaluation.calibration.table import told
 
@@ -97,11 +95,7 @@ def require_place(scenes: Sequence[SceneSource], folder: Path, formats: Sequence
         UsageError: if it, or the nearest folder above it that there is, is a file or closed to this user; or if a file
             of the pair, or of somebody else, would be replaced.
     """
-    place = next(each for each in (folder, *folder.absolute().parents) if each.exists())
-    if not place.is_dir():
-        raise UsageError(f"{folder}: cannot be written ({place} is a file); name another place")
-    if not os.access(place, os.W_OK | os.X_OK):
-        raise UsageError(f"{folder}: cannot be written (no permission in {place}); name another place")
+    require_writable(folder)
     inputs = [path for scene in scenes for path in scene.files.values()]
     endings = {ENDINGS[kind] for kind in formats}
     maps = {f"{each.name}.{ending}" for each in _QUANTITIES for ending in endings}
@@ -210,9 +204,10 @@ def _basis(match: Match) -> dict[str, Any]:
         return {"R_from": "as set" if match.filtered_by.get("density") is None else own}
     expected = match.expected_error
     words = "no pixel is sure enough for that error" if expected is None else f"R = {told(match.R)}"
+    basis = match.basis.words if match.basis else "by the confidences of the kept pixels"
     return {
         "R_from": "for the error asked for",
-        "R_basis": f"{words}; {match.basis.words}" if match.basis else words,
+        "R_basis": f"{words}; {basis}",
         "expected_error_percent": None if expected is None else 100 * expected,
     }
 

@@ -7,11 +7,14 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from semidense.datasets import Dataset, DisparityRange, open_dataset
 from semidense.datasets.pairs.arrays import array_pair
 from semidense.datasets.pairs.options import PairOptions, pair_spec
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.execution.watch import Watch
+from semidense.pipeline.pairs.findings import same_picture
 from semidense.pipeline.pairs.match import Match, Unit
 from semidense.pipeline.pairs.wishes import Wishes
 from semidense.pipeline.plan.config import Settings
@@ -40,7 +43,7 @@ class Score(Match):
 
     @property
     def warnings(self) -> list[str]:
-        """What looks wrong: with the files, and with a map that would fit the right view better in another reading."""
+        """What looks wrong: with the files, one view given twice, a map that fits better in another reading."""
         return [*self.scene.warnings, *self._misread]
 
     @cached_property
@@ -50,7 +53,10 @@ class Score(Match):
 
         if self.scene.one_view:
             return []
-        found = misreading(to_gray(self.image), to_gray(self._array("images", "right")), self.raw)
+        left, right = to_gray(self.image), to_gray(self._array("images", "right"))
+        if same := same_picture(float(np.mean(left == right))):
+            return same
+        found = misreading(left, right, self.raw)
         return [] if found is None else [found]
 
 

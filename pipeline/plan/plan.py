@@ -258,12 +258,13 @@ def _told(scene: SceneSource) -> str:
 def _closed(scene: SceneSource, store: Store, key: str) -> SceneSource:
     """Return the scene with its open ends as its survey estimates them."""
     low, high = np.asarray(store.arrays(key)["range"][...]).tolist()
+    edge, known = scene.size[1] - 1, scene.disparities
+    usual = min(edge, 127)
     if np.isnan(low):
         raise UsageError(
-            f"{scene.name}: too little in the two images agrees to estimate the range of disparities; give it, as in "
-            "--min-disp 0 --max-disp 127 (match) or pair:...,d_min=0,d_max=127"
+            f"{scene.name}: too little in the two images agrees to estimate the range of disparities; give both ends, "
+            f"as in --min-disp 0 --max-disp {usual} (match) or pair:...,d_min=0,d_max={usual}"
         )
-    edge, known = scene.size[1] - 1, scene.disparities
     # What has no texture is not seen by the survey: it may widen a range that is half known, never take 0 out of it.
     least = int(low) if "maximum" in scene.open_ends else min(0, int(low))
     first = max(-edge, least) if "minimum" in scene.open_ends else known.minimum

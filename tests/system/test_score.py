@@ -102,6 +102,16 @@ def test_what_score_does_not_offer_is_refused(folder: Path, wish: str) -> None:
         pipeline.score(folder / "left.png", folder / "map.pfm", cache=folder / "cache", **{wish: True})
 
 
+def test_the_left_view_given_twice_is_warned_of(invoke: Invoke, folder: Path, tmp_path: Path) -> None:
+    left, place = folder / "left.png", ["-o", tmp_path / "out", "--cache", folder / "cache"]
+    assert "the two views are the same picture" in invoke("score", left, folder / "map.pfm", left, *place).err
+
+
+def test_the_map_in_the_place_of_the_right_view_is_told(invoke: Invoke, folder: Path) -> None:
+    ran = invoke("score", folder / "left.png", folder / "right.png", folder / "map.pfm")
+    assert (ran.code, ran.err.count("\n")) == (2, 1) and "the map comes second" in ran.err
+
+
 def test_without_a_right_view_what_needs_it_is_refused(folder: Path) -> None:
     task = Task(f"pair:{folder}/left.png,disparity={folder}/map.pfm", cache=folder / "cache")
     with pytest.raises(StageError, match="channels needs the right view, which was not given"):

@@ -188,13 +188,24 @@ def _carry_out(
     print(console.reuse_line(_results(found)))
 
 
+_ESTIMATED = {
+    (): "",
+    ("minimum",): " (the smallest estimated from the images)",
+    ("maximum",): " (the largest estimated from the images)",
+    ("minimum", "maximum"): " (estimated from the images)",
+}
+"""What is told of a range, by its ends that were not given."""
+
+
 def _say(match: "Match", about: dict[str, Any]) -> None:
     """Print one pair's result: what was searched, what was kept, where it is."""
     from semidense.stages.evaluation.calibration.table import told
 
     low, high = match.disparities.minimum, match.disparities.maximum
-    ends = " (estimated from the images)" if match.scene.open_ends else ""
-    print(f"{match.scene.name}: {about['rows']} x {about['columns']} px, disparities {low} to {high} px{ends}")
+    print(
+        f"{match.scene.name}: {about['rows']} rows x {about['columns']} columns, disparities {low} to {high} px"
+        f"{_ESTIMATED[match.scene.open_ends]}"
+    )
     if match.shifts:
         print(
             "  shifted the rows of the right view by {:+.1f} to {:+.1f} px to those of the left".format(*match.shifts)

@@ -64,11 +64,14 @@ def run(
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
     from semidense.pipeline.execution.scheduler import threads_of
+    from semidense.pipeline.files.writing import require_writable
 
     task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     if dry_run:
         plan = api.status(task, upto, forced=force or ())
         return console.show_plan(plan, api.open_store(cache), as_json, threads_of(scheduler, workers))
+    if output:
+        require_writable(output)
     with ProgressWatch(console.announce, verbose - quiet) as watch:
         result = api.run(task, upto, forced=force or (), watch=watch, scheduler=scheduler, workers=workers)
     files = _export(result, output)
@@ -116,12 +119,14 @@ def sweep(
     from semidense.pipeline.execution.progress import ProgressWatch
     from semidense.pipeline.execution.scheduler import threads_of
     from semidense.pipeline.files.run_files import write_sweep
+    from semidense.pipeline.files.writing import require_writable
 
     task = _task(dataset, scene, chosen(None, mode), config, train, cache, preset)
     if dry_run:
         request = api.sweep_request(task, thresholds, settings or ())
         plan = api.planned(task, request)
         return console.show_plan(plan, api.open_store(cache), as_json, threads_of(scheduler, workers))
+    require_writable(output)
     with ProgressWatch(console.announce, verbose - quiet) as watch:
         result = api.sweep(task, thresholds, settings or (), watch=watch, scheduler=scheduler, workers=workers)
     files = write_sweep(result.metrics, output)

@@ -77,8 +77,11 @@ def score(
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
     from semidense.pipeline.pairs.wishes import Wishes
+    from semidense.pipeline.plan.errors import UsageError
     from semidense.pipeline.plan.presets import FOREIGN
 
+    if right and Path(right).suffix.lower() in (".npy", ".pfm"):
+        raise UsageError(f"{right}: the map comes second: pipeline score LEFT MAP RIGHT")
     options = PairOptions(tuple(calib or ()), unit, disparity=disparity, scale=scale, none=none)
     spec = pair_spec([left] if right is None else [left, right], options)
     wishes = Wishes(R=threshold, density=share("density", density), max_error=share("max-error", max_error))
@@ -121,7 +124,7 @@ def _say(scored: "Score", about: dict[str, Any]) -> None:
 
     known = np.isfinite(scored.raw)
     low, high = np.nanmin(scored.raw), np.nanmax(scored.raw)
-    print(f"{scored.scene.name}: {about['rows']} x {about['columns']} px")
+    print(f"{scored.scene.name}: {about['rows']} rows x {about['columns']} columns")
     print(
         f"  read {about['map']} with {about['map_reading']['scale']:g} to a pixel: {100 * known.mean():.1f} % of the "
         f"pixels have a disparity, {low:.4g} to {high:.4g} px"

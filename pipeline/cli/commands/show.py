@@ -3,6 +3,7 @@
 Nothing heavy is imported before one of them runs.
 """
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -45,12 +46,20 @@ def report(
 
     Figures, curves, maps, training and settings; it loads nothing and makes nothing.
     """
-    from semidense.pipeline.api import Task
+    from semidense.pipeline.api import Task, status
+    from semidense.pipeline.files.suggestion import run_command
     from semidense.pipeline.pages.report import report as write
 
     named = chosen_preset(preset, config)
     task = Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), train, cache, named)
     path = write(task, output)
+    plan = status(task)
+    if plan.todo():
+        print(
+            f"{len(plan.todo())} of {len(plan.steps)} products are not cached, and the page lacks them; make them with "
+            f"`{run_command(task)}`",
+            file=sys.stderr,
+        )
     if as_json:
         from semidense.pipeline.cli.console import print_json
 

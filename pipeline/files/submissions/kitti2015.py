@@ -34,7 +34,7 @@ def _check(name: str, content: bytes, scene: SceneSource) -> None:
 
 def _lacks(scenes: Collection[SceneSource]) -> str | None:
     if any(scene.has_truth for scene in scenes):
-        return "these are frames of training; the server judges those of testing"
+        return "of frames of training; it judges those of testing"
     missing = sorted(_FRAMES - {scene.name.rpartition("/")[2] for scene in scenes})
     return f"without {len(missing)} of the 200 frames, {missing[0]} first" if missing else None
 

@@ -63,7 +63,7 @@ def _lacks(scenes: Collection[SceneSource]) -> str | None:
         found.setdefault(folder, set()).add(name)
     sizes = {folder[-1] for folder in found}
     if len(sizes) > 1:
-        return f"the sizes {' and '.join(sorted(sizes))} do not go together; submit one"
+        return f"of the sizes {' and '.join(sorted(sizes))} together"
     size = "".join(sizes)
     missing = {f"training{size}": _TRAINING - found.get(f"training{size}", set())}
     if f"test{size}" in found:

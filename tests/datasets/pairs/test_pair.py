@@ -78,7 +78,7 @@ def test_views_of_different_size_are_refused_before_a_pixel_is_read(folder: Path
 
 
 def test_a_single_path_must_be_a_list(folder: Path) -> None:
-    with pytest.raises(DatasetError, match="must be a list"):
+    with pytest.raises(DatasetError, match="the right view is missing"):
         open_dataset(f"pair:{folder}/left.png")
 
 

@@ -267,6 +267,33 @@ def test_a_file_that_ends_too_early_is_a_fault_and_no_wish_to_stop(
     assert "Compressed file" in str(error.value.__cause__)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["macth"], "pipeline: No such command 'macth'"),
+        (["run", "--prest", "robust"], "pipeline: No such option: --prest"),
+        (["match", "a.png", "b.png", "--R", "90%"], "pipeline: Invalid value for '--R'"),
+        (["score", "a.png"], "pipeline: Missing argument 'disparity'; see `pipeline score --help`"),
+        (["run", "motorcycle", "more"], "pipeline: Got unexpected extra argument(s) (more); see `pipeline run --help`"),
+    ],
+)
+def test_a_word_that_no_command_knows_is_one_line(invoke: Invoke, arguments: list[str], told: str) -> None:
+    ran = invoke(*arguments)
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert ran.err.startswith(told)
+
+
+@pytest.mark.parametrize("command", [["run"], ["sweep"], ["compare"], ["submit", "eth3d", "--partial"]])
+def test_a_place_that_cannot_be_written_is_told_before_anything_is_made(
+    invoke: Invoke, tmp_path: Path, command: list[str]
+) -> None:
+    (tmp_path / "file").touch()
+    ran = invoke(*command, TEST_ONLY, "-o", tmp_path / "file" / "out", "--cache", tmp_path / "cache")
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert f"{tmp_path / 'file'} is a file" in ran.err or "no test scene" in ran.err
+    assert not (tmp_path / "cache").exists()
+
+
 def test_no_command_shows_what_there_is(invoke: Invoke) -> None:
     ran = invoke()
     assert "Usage: pipeline" in ran.out + ran.err

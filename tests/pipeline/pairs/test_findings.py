@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,8 @@ def survey(
     matches = np.zeros((count, 4), np.float32)
     matches[:, 0], matches[:, 1] = 40 * step * (np.arange(count) // 40), 20 * step * (np.arange(count) % 40)
     matches[:, 2], matches[:, 3] = disparity, vertical
-    return {"matches": matches, "equal": np.array([equal]), "step": np.array([step])}
+    likely = matches[:, 2].min(), matches[:, 2].max()
+    return {"matches": matches, "equal": np.array([equal]), "step": np.array([step]), "range": np.array(likely)}
 
 
 RAMP = np.linspace(-1, 1, 1000)
@@ -54,6 +57,30 @@ def test_rows_that_were_shifted_are_told() -> None:
     (alone,), (aligned,) = (findings(survey(20, 4), None, aligned=each) for each in (False, True))
     assert "its rows were shifted" in aligned and "its rows were shifted" not in alone
     assert findings(survey(20, 0.4), None, aligned=True) == []
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "told"),
+    [
+        (0, 30, None),
+        (16, 24, None),  # a step more at each end is no surprise
+        (0, 20, "40 % of the places that agree between the views lie outside of the 0 to 20 px .* search 0 to 25 px"),
+        (22, 60, "60 % .* outside of the 22 to 60 px .* search 15 to 60 px"),
+        (0, 2, "100 % .* search 0 to 25 px"),
+    ],
+)
+@pytest.mark.parametrize("estimated", [False, True])
+def test_a_range_that_leaves_out_what_matches_is_told(low: int, high: int, told: str | None, estimated: bool) -> None:
+    said = findings(survey(20 + 5 * RAMP), DisparityRange(low, high), estimated=estimated)
+    assert len(said) == (told is not None)
+    if told:
+        assert re.match(told, said[0])
+
+
+def test_stray_matches_outside_the_range_are_no_surprise() -> None:
+    stray = survey(np.where(RAMP > 0.8, 90, 20))
+    stray["range"] = np.array([15, 25])  # the look at the pair found them too lonely
+    assert findings(stray, DisparityRange(0, 30)) == []
 
 
 @pytest.mark.parametrize(("low", "warned"), [(-30, False), (0, True)])

@@ -45,13 +45,22 @@ def _print(found: Sequence[Checked]) -> None:
     for each in found:
         for line in (*each.problems, *(f"note: {warning}" for warning in each.warnings)):
             console.print(f"{each.scene}: {line}", markup=False, soft_wrap=True)
-    wrong = sum(bool(each.problems) for each in found)
-    console.print(f"{len(found)} scenes, {wrong} with something wrong" if wrong else f"{len(found)} scenes, all sound")
+    verdicts = [_verdict(each) for each in found]
+    counts = {name: verdicts.count(name) for name in _COUNTED}
+    scenes = "1 scene" if len(found) == 1 else f"{len(found)} scenes"
+    console.print(f"{scenes}: " + ", ".join(f"{count} {_COUNTED[name]}" for name, count in counts.items() if count))
+
+
+_COUNTED = {"sound": "sound", "wrong": "with something wrong", "no truth": "without a truth, so not checked"}
+"""How each verdict is counted."""
+
+
+def _verdict(each: Checked) -> str:
+    return "wrong" if each.problems else "sound" if each.truth else "no truth"
 
 
 def _cells(each: Checked) -> list[str]:
     span = "-" if each.least is None else f"{each.least:.4g}..{each.largest:.4g}"
-    verdict = "wrong" if each.problems else "sound" if each.truth else "no truth"
     shares = [f"{100 * share:.1f}" if share is not None else "-" for share in (each.known, each.visible)]
     fit = "-" if each.fit is None else f"{each.fit:.2f}"
-    return [escape(each.scene), f"{each.size[0]} x {each.size[1]}", span, *shares, fit, verdict]
+    return [escape(each.scene), f"{each.size[0]} x {each.size[1]}", span, *shares, fit, _verdict(each)]

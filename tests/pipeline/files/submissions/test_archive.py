@@ -127,7 +127,7 @@ def test_a_complete_set_lacks_nothing(benchmark: str, scenes: list[SceneSource])
         ("middlebury", TRAINING_SCENES[1:], "without trainingH: Adirondack;"),
         ("middlebury", TEST_SCENES, "without trainingH: Adirondack, ArtL"),
         ("middlebury", TRAINING_SCENES + TEST_SCENES[1:], "without testH: Australia;"),
-        ("middlebury", [*TRAINING_SCENES, scene_of("trainingQ/Teddy")], "sizes H and Q do not go together"),
+        ("middlebury", [*TRAINING_SCENES, scene_of("trainingQ/Teddy")], "of the sizes H and Q together"),
         ("kitti2015", FRAMES[1:], "without 1 of the 200 frames, 000000_10 first"),
         ("kitti2015", [scene_of("000000_10", True)], "frames of training"),
         ("eth3d", [scene_of("a")], "with 1 of the 20 scenes of two_view_test"),

@@ -43,7 +43,7 @@ def test_a_benchmark_is_fetched_from_a_folder_and_checked(invoke: Invoke, tmp_pa
         "name": "middlebury2003", "dataset": spec, "fetched": False, "lock": str(data / "fetched.lock"),
     }  # fmt: skip
     ran = invoke("data", "check", spec)
-    assert (ran.code, ran.out.splitlines()[-1]) == (0, "2 scenes, all sound")
+    assert (ran.code, ran.out.splitlines()[-1]) == (0, "2 scenes: 2 sound")
 
 
 def test_a_wrong_copy_is_told_and_the_exit_code_is_1(invoke: Invoke, tmp_path: Path) -> None:
@@ -52,7 +52,7 @@ def test_a_wrong_copy_is_told_and_the_exit_code_is_1(invoke: Invoke, tmp_path: P
     ran = invoke("data", "check", f"middlebury:{tmp_path}")
     assert ran.code == 1
     assert "2003/cones: 2 times the truth carries the right view onto the left one better" in ran.out
-    assert ran.out.splitlines()[-1] == "2 scenes, 1 with something wrong"
+    assert ran.out.splitlines()[-1] == "2 scenes: 1 sound, 1 with something wrong"
     ran = invoke("data", "check", f"middlebury:{tmp_path}", "--scene", "teddy", "--json")
     (row,) = json.loads(ran.out)["scenes"]
     assert (ran.code, row["scene"], row["problems"], row["scale"]) == (0, "2003/teddy", [], 1)
