@@ -116,7 +116,7 @@ def test_a_bad_picture_is_one_line_and_leaves_nothing(
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        pytest.param(["{}/im0.png"], ["must be a list"], id="one picture"),
+        pytest.param(["{}/im0.png"], ["the right view is missing"], id="one picture"),
         pytest.param(["{}", "{}/im1.png"], ["one is a folder"], id="a folder and a picture"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--max-disp", "48"], ["only 48 px wide"], id="wider than the image"),
         pytest.param(["{}/im0.png", "{}/im1.png", "--min-disp", "9", "--max-disp", "3"], ["is empty"], id="empty"),
