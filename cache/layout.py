@@ -233,6 +233,10 @@ def place_of(root: Path | str) -> Path | str:
     Raises:
         CacheUnavailable: if it is a URL of another kind than ``SCHEMES``.
     """
+    if any(ord(character) < ord(" ") for character in str(root)):
+        raise CacheUnavailable(
+            f"{str(root)!r} is no place for a cache: it holds a line break or another control character"
+        )
     match = _URL.fullmatch(str(root))
     if match is None:
         return Path(root).absolute()

@@ -24,6 +24,7 @@ from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.plan.training_split import training_scenes
 from semidense.pipeline.results.metric_rows import METHOD
 from semidense.pipeline.results.result import Result
+from semidense.stages.evaluation.filtering import SemidenseParams
 
 CACHE_VARIABLE = "PIPELINE_CACHE"
 
@@ -33,6 +34,8 @@ def open_store(folder: Path | str | None = None) -> Store:
     from platformdirs import user_cache_path
 
     chosen = str(folder or os.environ.get(CACHE_VARIABLE) or user_cache_path("semidense-stereo", appauthor=False))
+    if chosen.startswith("memory:"):
+        raise UsageError(f"cache {chosen}: it would end with this process; name a folder or an object store")
     return Store(chosen if "://" in chosen else user_path(chosen))
 
 
@@ -118,7 +121,12 @@ class Task:
         configs = {", ".join(further): self.and_settings(further).configuration() for further in variants}
         training: tuple[SceneSource, ...] = ()
         if self.train:
-            other = next(iter(configs.values())).training.dataset
+            others = {config.training.dataset for config in configs.values()}
+            if len(others) > 1:
+                raise UsageError(
+                    "training.dataset cannot be swept: a sweep trains on the same scenes; run one after the other"
+                )
+            (other,) = others
             training = training_scenes(open_dataset(other) if other else self._whole())
         return Request(self.open(), configs, upto, self.train, training)
 
@@ -138,7 +146,16 @@ def status(
 def planned(task: Task, request: Request, forced: Sequence[str] = ()) -> Plan:
     """Return the plan of a request: every step with its state. Nothing is made or changed."""
     store = open_store(task.cache)
-    return make_plan(close_ranges(request, store), store, forced)
+    return _plan(close_ranges(request, store), store, forced)
+
+
+def _plan(request: Request, store: Store, forced: Iterable[str]) -> Plan:
+    """Return the plan of what is to be made; refuse a product of training scenes where there are none."""
+    plan = make_plan(request, store, forced)
+    for step in (planned.step for planned in plan.steps):
+        if not all(step.inputs.values()):
+            raise UsageError(f"{step.product} is made from training scenes, and there are none here: add --train")
+    return plan
 
 
 def run(
@@ -184,7 +201,7 @@ def carry_out(
     extras = provenance(sys.argv)
 
     def make(wanted: Request, forced: Iterable[str] = ()) -> tuple[Plan, dict[str, Made]]:
-        plan_again = functools.partial(make_plan, wanted, store, forced)
+        plan_again = functools.partial(_plan, wanted, store, forced)
         return attempt(plan_again, store, watch or Unwatched(), extras, scheduler, workers)
 
     plan, made = make(close_ranges(request, store, lambda wanted: make(wanted)[1]), forced)
@@ -233,10 +250,12 @@ def sweep(
 
 def sweep_request(task: Task, R: str | float | Sequence[float], over: Mapping[str, object] | Sequence[str]) -> Request:
     """Return the request of a sweep; see ``sweep``."""
-    thresholds = [f"semidense.R={value!r}" for value in parse_thresholds(R)]
-    variants = [
-        (threshold, *combination) for combination in itertools.product(*_combined(over)) for threshold in thresholds
-    ]
+    thresholds, combined = [f"semidense.R={value!r}" for value in parse_thresholds(R)], _combined(over)
+    if any(setting.partition("=")[0] == "semidense.R" for values in combined for setting in values):
+        raise UsageError("semidense.R is swept by R; give its values there")
+    if not task.configuration().of("semidense", SemidenseParams).by_R:
+        raise UsageError("semidense.density and semidense.max_error replace R, which is swept; leave them out")
+    variants = [(threshold, *combination) for combination in itertools.product(*combined) for threshold in thresholds]
     return task.request("metrics", variants)
 
 

@@ -83,7 +83,7 @@ class StageError(ValueError):
 class Params(BaseModel):
     """One section of the configuration: exactly the fields that enter the keys of its stage."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False)
 
 
 class NoParams(Params):

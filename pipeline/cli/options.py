@@ -140,7 +140,8 @@ def chosen_preset(preset: str | None, config: Path | None, default: str = DEFAUL
 def _recorded_preset(file: Path) -> str | None:
     """Return the preset in a ``config.json``; None if there is none, also in a file that will be refused later."""
     try:
-        found = json.loads(file.read_text())["preset"] if file.suffix == ".json" else None
+        plain = file.suffix == ".json" and file.is_file()  # a pipe would keep us waiting
+        found = json.loads(file.read_text())["preset"] if plain else None
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return None
     return found if isinstance(found, str) else None

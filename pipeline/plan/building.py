@@ -118,9 +118,10 @@ class _Builder:
         """Add a product of each training scene that was asked for, made by networks that have not seen it."""
         dataset = self.request.dataset
         judged = held_out_scenes(self.config, dataset, self._mapped() if self.request.train else ())
-        if len(judged) < len(dataset.scenes):
+        asked = sum(scene.split == "train" for scene in dataset.scenes)
+        if len(judged) < asked:
             self.graph.notes.append(
-                f"training.held_out judges {len(judged)} of {len(dataset.scenes)} scenes: those that the confidence "
+                f"training.held_out judges {len(judged)} of {asked} training scenes: those that the confidence "
                 "learns from (training.maps says how many of each data set)"
             )
         for scene in judged:
@@ -182,6 +183,11 @@ class _Builder:
             return (self.product(product, scene),)
         if not any("costvolume" in made_from(each) for each in stage.inputs):
             return tuple(self.product(product, source) for source in self.request.training)
+        if self.request.training and not self._mapped():
+            raise UsageError(
+                f"{stage.product}: the scenes that the confidence learns from are all in one fold; give another number "
+                "of them (training.maps) or of folds (calibration.folds)"
+            )
         cross_fitted = stage.cross_fitted or self.config.training.cross_fit
         return tuple(
             (self._not_having_seen(source) if cross_fitted else self).product(product, source)

@@ -144,9 +144,9 @@ def _read_file(file: Path) -> dict[str, Any]:
 def _read_exported(file: Path) -> dict[str, Any]:
     """Return the settings of a ``config.json`` or ``summary.json``, without ranges: each scene has its own."""
     try:
-        found = [_set_by_users(each["sections"]) for each in json.loads(file.read_text())["configuration"]]
-    except OSError as error:
-        raise UsageError(f"configuration {file}: {error.strerror}") from None
+        found = [_set_by_users(each["sections"]) for each in json.loads(_text_of(file))["configuration"]]
+    except UsageError:
+        raise
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
         raise UsageError(f"configuration {file}: it is no config.json or summary.json of this version") from None
     if not found or any(each != found[0] for each in found):
@@ -167,17 +167,24 @@ def _set_by_users(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
 
 def _read_toml(file: Path) -> dict[str, Any]:
     try:
-        if file.exists() and not (file.is_file() or file.is_dir()):  # a pipe would keep us waiting
-            raise UsageError(f"configuration {file}: it is not a plain file")
-        if file.stat().st_size > LONGEST_FILE:
-            raise UsageError(f"configuration {file}: it has more than {LONGEST_FILE:,} bytes; is it the right file?")
-        return tomllib.loads(file.read_text())
+        return tomllib.loads(_text_of(file))
     except RecursionError:
         raise UsageError(f"configuration {file}: it is nested too deeply") from None
     except UsageError:
         raise
-    except (OSError, ValueError) as error:  # of a number with too many digits, a plain ValueError
-        raise UsageError(f"configuration {file}: {getattr(error, 'strerror', None) or error}") from None
+    except ValueError as error:  # of a number with too many digits, a plain one
+        raise UsageError(f"configuration {file}: {error}") from None
+
+
+def _text_of(file: Path) -> str:
+    try:
+        if file.exists() and not (file.is_file() or file.is_dir()):  # a pipe would keep us waiting
+            raise UsageError(f"configuration {file}: it is not a plain file")
+        if file.stat().st_size > LONGEST_FILE:
+            raise UsageError(f"configuration {file}: it has more than {LONGEST_FILE:,} bytes; is it the right file?")
+        return file.read_text()
+    except OSError as error:
+        raise UsageError(f"configuration {file}: {error.strerror or error}") from None
 
 
 def setting_texts(settings: Settings) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """What changes a result's bits besides code, settings and inputs: the versions of packages, and the kind of CPU."""
 
+import itertools
 import platform
 from functools import cache
 from importlib import metadata
@@ -68,7 +69,17 @@ def former_version(entry: Entry) -> str | None:
     ours = [name for name in entry.recipe.code if name.partition(".")[0] in ("semidense", *FORMER)]
     if all(map(_is_there, ours)):
         return None
-    return str(entry.extras.get("versions", {}).get("semidense-stereo", "unknown"))
+    made_by = str(entry.extras.get("versions", {}).get("semidense-stereo", "unknown"))
+    return None if _numbers(made_by) > _numbers(version("semidense-stereo")) else made_by
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    """Return the numbers of a version that begin it; nothing of one that is not known.
+
+    >>> _numbers("0.10.0") > _numbers("0.9.1.dev3") > _numbers("unknown")
+    True
+    """
+    return tuple(int(part) for part in itertools.takewhile(str.isdecimal, text.split(".")))
 
 
 @cache

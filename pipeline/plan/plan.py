@@ -16,6 +16,7 @@ from semidense.cache import ABSENT, Change, Entry, Recipe, Store, differences
 from semidense.datasets import Dataset, DisparityRange, SceneSource
 from semidense.pipeline.plan.building import build
 from semidense.pipeline.plan.causes import PENDING, Causes
+from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.environment import former_version, version
 from semidense.pipeline.plan.errors import UsageError, nearest
 from semidense.pipeline.plan.steps import Graph, Request, Step, needs_range, products
@@ -110,7 +111,10 @@ def make_plan(request: Request, store: Store, forced: Iterable[str] = ()) -> Pla
     unknown = sorted(set(forced) - set(products()))
     if unknown:
         raise UsageError(f"no product {unknown[0]!r} to force; {nearest(unknown[0], products())}")
-    return plan_graph(build(request), store, forced)
+    graph = build(request)
+    if idle := sorted(set(forced) - {step.product for step in graph.steps.values()}):
+        raise UsageError(f"{idle[0]} cannot be forced: a run up to {request.upto} does not make it")
+    return plan_graph(graph, store, forced)
 
 
 def plan_graph(graph: Graph, store: Store, forced: Iterable[str] = ()) -> Plan:
@@ -236,7 +240,7 @@ def close_ranges(request: Request, store: Store, make: Make | None = None) -> Re
     unknown = tuple(scene for scene in request.dataset.scenes if scene.open_ends)
     if not unknown or not needs_range(request.upto):
         return request
-    surveys = replace(request, dataset=Dataset(request.dataset.spec, unknown), upto="survey")
+    surveys = replace(request, dataset=Dataset(request.dataset.spec, unknown), upto="survey", configs=_plain(request))
     plan = make_plan(surveys, store)
     keys = {planned.step.scene: planned.key for planned in plan.steps if planned.state == "hit" and _is_survey(planned)}
     if make and plan.todo():
@@ -245,6 +249,14 @@ def close_ranges(request: Request, store: Store, make: Make | None = None) -> Re
     notes = tuple(f"{scene.name}: disparities {_told(scene)}, estimated from the images" for scene in closed.values())
     scenes = tuple(closed.get(scene.name, scene) for scene in request.dataset.scenes)
     return replace(request, dataset=Dataset(request.dataset.spec, scenes), notes=(*request.notes, *notes))
+
+
+def _plain(request: Request) -> dict[str, Config]:
+    """Return the configurations of a look at scenes: no network takes part, so no scene is held out."""
+    return {
+        name: config.model_copy(update={"training": config.training.model_copy(update={"held_out": False})})
+        for name, config in request.configs.items()
+    }
 
 
 def _is_survey(each: Planned | Made) -> bool:

@@ -103,10 +103,17 @@ def own_weights(product: str, file: Path) -> Weights:
 
 
 def _bytes_of(product: str, file: Path) -> bytes:
+    from semidense.stages.weights import LARGEST  # torch takes a second to load
+
+    told = f"weights.{product} = {file}"
+    if file.exists() and not (file.is_file() or file.is_dir()):  # a pipe would keep us waiting
+        raise StageError(f"{told}: it is not a plain file")
     try:
-        return file.read_bytes()
-    except OSError as error:
-        raise StageError(f"weights.{product} = {file}: {error.strerror or error}") from None
+        if file.stat().st_size <= LARGEST:
+            return file.read_bytes()
+    except (OSError, ValueError) as error:
+        raise StageError(f"{told}: {getattr(error, 'strerror', None) or error}") from None
+    raise StageError(f"{told}: it has more than {LARGEST:,} bytes; is it the right file?")
 
 
 def weights_name(

@@ -51,10 +51,10 @@ class Result:
             if made.step.product == product and scene in (None, made.step.scene, made.step.scene.rsplit("/", 1)[-1])
         ]
         if len(found) != 1:
-            names = ", ".join(sorted({made.step.scene for made in found})) or "none"
-            raise UsageError(
-                f"{product} of {scene or 'the only scene'}: {len(found)} results fit ({names}); name a scene"
-            )
+            names = sorted({made.step.scene for made in found})
+            way = "name a scene" if len(names) > 1 else "they are of several variants, which ``made`` holds"
+            told = f"{len(found)} results fit ({', '.join(names) or 'none'})"
+            raise UsageError(f"{product} of {scene or 'the only scene'}: {told}; {way}")
         return found[0]
 
     def open(self, product: str, scene: str | None = None) -> "xr.Dataset":

@@ -313,6 +313,11 @@ def test_a_url_of_another_kind_is_refused_in_one_line(url: str) -> None:
             Store(root)
 
 
+def test_a_url_with_a_line_break_is_no_folder() -> None:
+    with pytest.raises(CacheUnavailable, match="holds a line break"):
+        Store("s3://bucket/x\n")
+
+
 @pytest.mark.parametrize("root", ["s3://bucket/x", "S3://bucket/x/", Path("s3://bucket/x")])
 def test_a_url_has_one_spelling_also_where_a_path_lost_a_slash(root: Path | str) -> None:
     assert Store(root).root == "s3://bucket/x"

@@ -1,3 +1,4 @@
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -7,11 +8,13 @@ import pytest
 
 from semidense.pipeline import api
 from semidense.pipeline.api import Task, open_store, parse_thresholds, sweep_request
+from semidense.pipeline.cli.options import chosen_preset
 from semidense.pipeline.plan.config import Settings
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.opening import open_product, recorded
 from semidense.pipeline.results.result import Result
-from tests.tiny import SPEC
+from semidense.stages.stage import StageError
+from tests.tiny import SPEC, TEST_ONLY
 
 MakePair = Callable[[Path], Path]
 
@@ -30,6 +33,47 @@ MakePair = Callable[[Path], Path]
 )
 def test_thresholds_are_read(text: str, values: list[float]) -> None:
     assert parse_thresholds(text) == values
+
+
+def test_what_a_sweep_cannot_sweep_is_refused() -> None:
+    task = Task(SPEC, train=True)
+    with pytest.raises(UsageError, match=r"training\.dataset cannot be swept"):
+        sweep_request(task, 0.5, {"training.dataset": [SPEC, f"{SPEC},seed=2"]})
+    with pytest.raises(UsageError, match=r"semidense\.R is swept by R"):
+        sweep_request(task, 0.5, {"semidense.R": [0.2, 0.3]})
+    with pytest.raises(UsageError, match="replace R, which is swept"):
+        sweep_request(task.and_settings(["semidense.density=0.5"]), "0.1,0.5", ())
+
+
+def test_a_product_of_training_scenes_needs_some(tmp_path: Path) -> None:
+    for product in ("matching_samples", "o1", "ccnn"):
+        with pytest.raises(UsageError, match="is made from training scenes, and there are none here: add --train"):
+            api.status(SPEC, product, cache=tmp_path)
+
+
+def test_what_a_run_does_not_make_cannot_be_forced(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="metrics cannot be forced: a run up to channels does not make it"):
+        api.status(SPEC, "channels", forced=["metrics"], cache=tmp_path)
+
+
+def test_a_cache_in_memory_is_refused() -> None:
+    with pytest.raises(UsageError, match="memory://x: it would end with this process"):
+        open_store("memory://x")
+
+
+@pytest.mark.parametrize("setting", ["weights.matching_net", "config"])
+def test_a_pipe_keeps_no_plan_waiting(tmp_path: Path, setting: str) -> None:
+    pipe = tmp_path / ("c.json" if setting == "config" else "w.safetensors")
+    os.mkfifo(pipe)
+    how = {"config": pipe} if setting == "config" else {"settings": [f"{setting}={pipe}"]}
+    with pytest.raises((UsageError, StageError), match="it is not a plain file"):
+        api.status(TEST_ONLY, cache=tmp_path / "cache", **how)
+    assert chosen_preset(None, tmp_path / "c.json") == "paper"
+
+
+def test_infinity_is_no_setting() -> None:
+    with pytest.raises(UsageError, match=r"refined\.tolerance = inf"):
+        Task(SPEC, settings=["refined.tolerance=Infinity"]).configuration()
 
 
 def test_a_value_that_stands_alone_is_swept_as_one() -> None:

@@ -153,7 +153,9 @@ def test_before_the_survey_a_plan_stops_there(folder: Path, tmp_path: Path) -> N
 
 def test_a_range_that_nothing_tells_is_refused(tmp_path: Path) -> None:
     flat = np.full((40, 50), 7, np.uint8)
-    with pytest.raises(UsageError, match=r"too little in the two images agrees .* give both ends, as in --min-disp 0 --max-disp 49"):
+    with pytest.raises(
+        UsageError, match=r"too little in the two images agrees .* give both ends, as in --min-disp 0 --max-disp 49"
+    ):
         match(flat, flat, cache=tmp_path)
 
 

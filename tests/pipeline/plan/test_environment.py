@@ -32,3 +32,8 @@ def test_an_entry_of_another_version_is_recognised(code: dict[str, str], former:
 
 def test_an_entry_that_does_not_tell_its_version_is_recognised_too(tmp_path: Path) -> None:
     assert former_version(_entry(Store(tmp_path / "cache"), {"cache": "1f"}, {})) == "unknown"
+
+
+def test_an_entry_of_a_later_version_is_left_to_it(tmp_path: Path) -> None:
+    code = {**HERE, "semidense.stages.transforms.tomorrow": "3f"}
+    assert former_version(_entry(Store(tmp_path / "cache"), code, {"semidense-stereo": "99.0.1"})) is None

@@ -5,8 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from semidense.datasets import Dataset, SceneSource, open_dataset
+from semidense.pipeline.api import Task, status
 from semidense.pipeline.plan import shipped_weights as shipped
 from semidense.pipeline.plan.building import build
 from semidense.pipeline.plan.config import Config
@@ -16,7 +18,7 @@ from semidense.pipeline.plan.steps import SPLIT, Graph, Request, Step, products
 from semidense.pipeline.plan.training_split import training_scenes
 from semidense.stages.catalog import CATALOG, READ
 from semidense.stages.stage import StageError
-from tests.tiny import PATH
+from tests.tiny import PATH, SPEC, TEST_ONLY
 
 DATASET = open_dataset("synthetic:train=2,test=2,height=64,width=80,disparities=8")
 SHIPPED = {"matching_net", "evaluation_net"}
@@ -162,13 +164,32 @@ def test_held_out_scenes_are_judged_by_networks_that_have_not_seen_them() -> Non
             assert {made.steps[each].scene for each in learnt} == {"train-0", "train-1"} - {step.scene}
 
 
+def test_folds_of_which_one_has_all_the_maps_are_refused() -> None:
+    many = open_dataset("synthetic:train=4,test=1,height=64,width=80,disparities=8")
+    config = Config.load(None, ["training.maps=2"])
+    with pytest.raises(UsageError, match="all in one fold; give another number of them"):
+        build(Request(many, {"": config}, "calibrated_confidence", True, training_scenes(many)))
+
+
+def test_held_out_scenes_are_judged_beside_pairs_of_unknown_range(tmp_path: Path) -> None:
+    scene = open_dataset(TEST_ONLY).scenes[0].load()
+    for side, view in (("l", scene.left), ("r", scene.right)):
+        Image.fromarray(view).save(tmp_path / f"{side}.png")
+    task = Task(f"{SPEC}+pair:{tmp_path}/l.png,{tmp_path}/r.png", train=True, settings=["training.held_out=true"])
+    plan = status(task, "disparity", cache=tmp_path / "cache")
+    assert {planned.step.scene for planned in plan.steps if planned.step.product == "disparity"} == {
+        "train-0",
+        "train-1",
+    }
+
+
 def test_held_out_scenes_are_those_whose_maps_are_learnt_from_and_that_were_asked_for() -> None:
     many = open_dataset("synthetic:train=6,test=1,height=64,width=80,disparities=8")
     config = Config.load(None, ["training.held_out=true", "training.maps=3"])
     asked = many.select(["train-1", "train-2", "test-0"])
     made = build(Request(asked, {"": config}, "disparity", True, training_scenes(many)))
     assert [made.steps[target].scene for target, _ in made.targets] == ["train-1"]
-    assert [note for note in made.notes if "training.held_out judges 1 of 3 scenes" in note]
+    assert [note for note in made.notes if "training.held_out judges 1 of 2 training scenes" in note]
 
 
 @pytest.mark.parametrize(

@@ -14,11 +14,11 @@ from semidense.cache.upkeep.gc import collect, survey
 from semidense.cache.upkeep.limits import Item, Limits, Survey
 from semidense.pipeline.api import Task, open_store
 from semidense.pipeline.cli.console import print_json
+from semidense.pipeline.cli.options import chosen_preset, config_file
 from semidense.pipeline.plan.building import build
 from semidense.pipeline.plan.environment import former_version
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import close_ranges
-from semidense.pipeline.plan.presets import DEFAULT
 from semidense.pipeline.plan.steps import Graph, Step
 from semidense.pipeline.results.text import bytes_text, print_table, results
 
@@ -61,9 +61,10 @@ class Wish:
         for entry in entries:
             by_label.setdefault(_label(entry.label), []).append(entry)
         digests = {entry.key: entry.digest for entry in entries}
-        for dataset, config, preset in product(self.keep, self.configs or (None,), self.presets or (DEFAULT,)):
-            request = Task(dataset, config=config, train=self.train, preset=preset).request("metrics")
-            yield from _keys(build(close_ranges(request, store)), digests, by_label)
+        for dataset, config in product(self.keep, self.configs or (config_file(None),)):
+            for preset in self.presets or (chosen_preset(None, config),):
+                request = Task(dataset, config=config, train=self.train, preset=preset).request("metrics")
+                yield from _keys(build(close_ranges(request, store)), digests, by_label)
 
 
 def _label(label: Mapping[str, str]) -> Label:

@@ -70,7 +70,7 @@ def cache_gc(
     ] = None,
     preset: Annotated[
         list[str] | None,
-        typer.Option("--preset", help="The runs to keep have this preset [default: paper]; may be repeated."),
+        typer.Option("--preset", help="The runs to keep have this preset [default: as of run]; may be repeated."),
     ] = None,
     train: Annotated[bool, typer.Option("--train", help="The runs to keep have --train.")] = False,
     unused_for: Annotated[

@@ -43,6 +43,17 @@ def test_a_preset_is_kept_if_it_is_named(made: Result, tmp_path: Path) -> None:
     assert kept(store, "paper", "robust") == keys_of(made) | keys_of(robust)
 
 
+def test_the_settings_that_a_run_finds_are_those_that_are_kept(
+    made: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = copied(made, tmp_path)
+    (tmp_path / "pipeline.toml").write_text("[channels]\nrank_window = 15\n")
+    monkeypatch.chdir(tmp_path)
+    other = run(Task(TEST_ONLY, cache=store.root, config=tmp_path / "pipeline.toml"), "channels")
+    assert keys_of(other) <= (kept(store) or frozenset())
+    assert made.find("channels").key not in (kept(store) or frozenset())
+
+
 def test_what_is_below_a_damaged_entry_is_kept(made: Result, tmp_path: Path) -> None:
     """It will be found again, since what is made again has the digest that the record tells."""
     store = copied(made, tmp_path)
