@@ -24,6 +24,8 @@ from semidense.datasets.readers import read_pair
 from semidense.datasets.scene import DisparityRange, Parameter, SceneSource, Split, Truth
 
 _FRAMES = "*_10.png"
+_ALL_PIXELS = "disp_occ"
+"""Beginning of the folder whose truth is of hidden pixels, too: alone it does not tell which are visible."""
 
 
 @dataclass(frozen=True)
@@ -92,12 +94,16 @@ def read_images(files: Mapping[str, Path], parameters: Mapping[str, Parameter]) 
 
 
 def read_truth(files: Mapping[str, Path], parameters: Mapping[str, Parameter]) -> Truth:
-    """Read the truth and its mask; raises `DatasetError` if a file cannot be read or the sizes differ."""
+    """Read the truth and its mask; raises `DatasetError` if a file cannot be read or the sizes differ.
+
+    Where the truth of visible pixels is missing, every known pixel counts.
+    """
     truth = read_png16(files["truth"])
     visible = read_png16(files["truth_nonocc"]) if "truth_nonocc" in files else truth
     if visible.shape != truth.shape:
         raise DatasetError(f"{files['truth_nonocc']}: {visible.shape}, but {files['truth']} is {truth.shape}")
-    return Truth(truth, ~np.isnan(visible) & ~np.isnan(truth), "non-occluded truth")
+    hidden_too = "truth_nonocc" not in files and files["truth"].parent.name.startswith(_ALL_PIXELS)
+    return Truth(truth, ~np.isnan(visible) & ~np.isnan(truth), "none" if hidden_too else "non-occluded truth")
 
 
 def _views(edition: Edition, root: Path) -> tuple[Path, int]:

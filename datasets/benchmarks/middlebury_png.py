@@ -19,7 +19,7 @@ import numpy as np
 from semidense.datasets.arrays import DisparityMap, ImageArray
 from semidense.datasets.benchmarks.folders import contents
 from semidense.datasets.errors import DatasetError, ImageError, LayoutError
-from semidense.datasets.formats.images import image_size, read_image
+from semidense.datasets.formats.images import image_size, read_stored
 from semidense.datasets.readers import assemble_truth, read_pair
 from semidense.datasets.scene import DisparityRange, Parameter, SceneSource, Truth
 
@@ -161,7 +161,7 @@ def _disparities(files: Mapping[str, Path], scale: int) -> DisparityRange:
 
 
 def _read_scaled(path: Path, scale: int) -> DisparityMap:
-    stored = read_image(path)
+    stored = read_stored(path)
     if stored.dtype != np.uint8 or stored.ndim != 2:
         raise ImageError(f"{path}: {stored.dtype} of {stored.shape}; a scaled disparity map is 8-bit gray")
     disparity: DisparityMap = stored.astype(np.float32) / np.float32(scale)

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tokenize import TokenError
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -96,7 +97,7 @@ def _memory_map(path: Path) -> NDArray[Any]:
         costs: NDArray[Any] = open_memmap(path, mode="r")  # unlike np.load, it takes .npy alone
     except OSError as error:
         raise MissingFileError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except ValueError as error:
+    except (ValueError, SyntaxError, TokenError) as error:
         raise DatasetError(f"{path}: this is not a NumPy file (.npy) of a cost volume ({error})") from error
     return costs
 
@@ -146,9 +147,11 @@ def _checked(path: Path, stored: _Stored) -> _Stored:
     values = stored.values
     if len(values.shape) != len(DIMS) or values.dtype.kind != "f" or not all(values.shape):
         raise DatasetError(f"{path}: {array_text(values)}; a cost volume has dims y, x, d in floating point")
-    if sorted(stored.dims) != sorted(DIMS):
+    if set(stored.dims) != set(DIMS):
         raise DatasetError(f"{path}: dims {', '.join(map(str, stored.dims))}; rename them to y, x, d")
     for dim, places in stored.coordinates.items():
+        if places.dtype.kind not in "iuf":
+            raise DatasetError(f"{path}: the coordinate {dim} is {places.dtype}; expected numbers")
         if not (np.diff(places) > 0).all():
             raise DatasetError(f"{path}: the coordinate {dim} does not rise; sort by it: sortby({dim!r})")
     disparities = stored.coordinates.get("d", np.arange(1))

@@ -6,6 +6,7 @@ not count.
 """
 
 import os
+import re
 import struct
 import warnings
 from collections.abc import Iterator
@@ -71,6 +72,19 @@ def read_image(path: str | os.PathLike[str]) -> ImageArray:
     with _opened(path) as (file, image):
         orientation, mode = _orientation(image), _target_mode(path, image)
         return _to_array(path, _upright(_decoded(path, file, image, mode), orientation))
+
+
+def read_stored(path: str | os.PathLike[str]) -> ImageArray:
+    """Read an image whose values mean something, such as disparities; as `read_image` otherwise.
+
+    Raises:
+        ImageError: Also if it is a PGM whose values would be scaled.
+    """
+    with open_file(Path(path)) as file:
+        head = re.sub(rb"#[^\n]*", b"", file.read(512)).split()
+    if head[:1] in ([b"P2"], [b"P5"]) and head[3:4] not in ([b"255"], [b"65535"]):
+        raise ImageError(f"{path}: a PGM whose largest value is not 255 or 65535 would be scaled; save it as PNG")
+    return read_image(path)
 
 
 def image_size(path: str | os.PathLike[str]) -> tuple[int, int]:

@@ -13,6 +13,9 @@ from semidense.datasets.formats.atomic import atomic_write
 from semidense.datasets.formats.files import open_file
 from semidense.datasets.formats.limits import check_pixels
 
+_PHOTOMETRIC, _WHITE_IS_ZERO = 0x0106, 0
+_SAMPLE_FORMAT, _SIGNED = 0x0153, 2
+
 
 def write_tiff(
     path: str | os.PathLike[str],
@@ -56,6 +59,10 @@ def read_tiff(path: str | os.PathLike[str]) -> np.ndarray[tuple[int, ...], np.dt
     try:
         with open_file(path) as file, Image.open(file, formats=["TIFF"]) as image:
             check_pixels(path, image.height, image.width, ImageError)
+            tags = image.getexif()
+            signed = image.mode == "L" and _SIGNED in np.atleast_1d(tags.get(_SAMPLE_FORMAT, 1))
+            if signed or tags.get(_PHOTOMETRIC) == _WHITE_IS_ZERO:
+                raise ImageError(f"{path}: values of 8 bits with a sign, or white as 0; save 32-bit floats or 16 bits")
             if len(image.getbands()) != 1 or getattr(image, "n_frames", 1) != 1:
                 raise ImageError(f"{path}: {len(image.getbands())} bands; a map is one band of one image")
             return np.array(image)

@@ -32,7 +32,7 @@ from semidense.datasets.arrays import DisparityMap, ImageArray
 from semidense.datasets.errors import DatasetError, LayoutError
 from semidense.datasets.formats.calibration.reading import read_cameras
 from semidense.datasets.formats.files import read_bytes, user_path
-from semidense.datasets.formats.images import image_size, read_image
+from semidense.datasets.formats.images import image_size, read_stored
 from semidense.datasets.formats.pfm import read_pfm
 from semidense.datasets.pairs import images
 from semidense.datasets.pairs.names import composed
@@ -48,6 +48,8 @@ _ENTRIES: dict[str, tuple[type, ...]] = {
     "scale": (int, float),
 }
 _LARGEST_FILE = 1 << 16
+_SCALES = (1e-6, 1e9)
+"""Smallest and largest stored value of 1 px, but for its sign."""
 
 
 def list_scenes(argument: str) -> tuple[SceneSource, ...]:
@@ -64,7 +66,8 @@ def list_scenes(argument: str) -> tuple[SceneSource, ...]:
     if not found["left"] or missing:
         what = f"no right view for {found['left'][missing[0]]}" if missing else "no left view"
         raise LayoutError(f"{path}: {what}; left = {entries['left']!r}, right = {entries['right']!r}")
-    return tuple(_source(path, entries, name, _files(found, name)) for name in sorted(found["left"]))
+    names = sorted(found["left"])
+    return tuple(_source(path, entries, name or found["left"][name].stem, _files(found, name)) for name in names)
 
 
 def read_images(files: Mapping[str, Path], parameters: Mapping[str, Parameter]) -> tuple[ImageArray, ImageArray]:
@@ -86,7 +89,9 @@ def read_truth(files: Mapping[str, Path], parameters: Mapping[str, Parameter]) -
 def _entries(path: Path) -> dict[str, Any]:
     try:
         entries = tomllib.loads(read_bytes(path, _LARGEST_FILE, DatasetError, "description").decode("utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:  # of a number with too many digits, a plain one
+        if isinstance(error, DatasetError):
+            raise
         raise DatasetError(f"{path}: no valid TOML ({error})") from error
     for name, value in entries.items():
         if name not in _ENTRIES:
@@ -110,16 +115,18 @@ def _check(path: Path, entries: Mapping[str, Any]) -> None:
             )
     if entries.get("split", "test") not in ("train", "test"):
         raise DatasetError(f"{path}: split = {entries['split']!r}; give train or test")
-    if not entries.get("scale", 1):
-        raise DatasetError(f"{path}: scale = 0; give the stored value of 1 px")
-    if "scale" not in entries and not entries.get("truth", ".pfm").lower().endswith(".pfm"):
-        raise DatasetError(f"{path}: no scale; the truth is an image, so give the stored value of 1 px")
+    if not _SCALES[0] <= abs(entries.get("scale", 1)) <= _SCALES[1]:
+        raise DatasetError(f"{path}: scale = {entries['scale']:.6g}; give the stored value of 1 px, such as 256")
+    for role in ("truth", "truth_right"):
+        if "scale" not in entries and not entries.get(role, ".pfm").lower().endswith(".pfm"):
+            raise DatasetError(f"{path}: no scale; {role} is an image, so give the stored value of 1 px")
 
 
 def _matches(folder: Path, pattern: str) -> dict[str, Path]:
     """Return the files that a pattern fits, by what its ``*`` stands for; without ``*`` one file, for all scenes."""
-    if pattern.count("*") > 1:
-        raise LayoutError(f"{pattern}: give one * in a pattern; it names the scene")
+    if pattern.count("*") > 1 or set(pattern) & set("[]?"):
+        raise LayoutError(f"{pattern}: give one * in a pattern, which names the scene, and no [, ] or ?")
+    pattern = PurePath(pattern).as_posix()  # without the ./ that a match will not have
     fits = re.compile(re.escape(composed(pattern)).replace(r"\*", "([^/]*)"))
     found = {}
     for path in sorted(folder.glob(pattern)):
@@ -157,6 +164,11 @@ def _closed(source: SceneSource) -> SceneSource:
     truth = _read_map(source.files["truth"], float(source.parameters["scale"] or 1))
     if np.isnan(truth).all():
         raise DatasetError(f"{source.files['truth']}: no known disparity in it; give d_min and d_max")
+    if (farthest := float(np.nanmax(np.abs(truth)))) >= source.size[1]:
+        raise DatasetError(
+            f"{source.files['truth']}: a disparity of {farthest:.6g} px in an image of {source.size[1]} px; give the "
+            "scale, the stored value of 1 px"
+        )
     low, high = source.disparities.minimum, source.disparities.maximum
     low = min(0, math.floor(np.nanmin(truth))) if "minimum" in source.open_ends else low
     high = math.ceil(np.nanmax(truth)) if "maximum" in source.open_ends else high
@@ -166,7 +178,7 @@ def _closed(source: SceneSource) -> SceneSource:
 def _read_map(path: Path, scale: float) -> DisparityMap:
     if path.suffix.lower() == ".pfm":
         return (read_pfm(path) / np.float32(scale)).astype(np.float32)
-    stored = read_image(path)
+    stored = read_stored(path)
     if stored.ndim != 2:
         raise DatasetError(f"{path}: a colour image; a map of disparities is gray")
     return np.where(stored > 0, stored / np.float32(scale), np.float32(np.nan)).astype(np.float32)

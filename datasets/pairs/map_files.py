@@ -12,9 +12,11 @@ PFM, PNG, TIFF and NumPy files (.npy) hold numbers; what they mean differs. A `R
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
+from numpy.lib.format import open_memmap
 from numpy.typing import NDArray
 
 from semidense.datasets.arrays import DisparityMap, array_text
@@ -111,10 +113,10 @@ def disparities(what: str, stored: Stored, reading: Reading, signed: bool = True
 
 def _read_npy(path: Path) -> Stored:
     try:
-        stored: Stored = np.load(path, allow_pickle=False)
+        stored = np.array(open_memmap(path, mode="r"))  # unlike np.load, it takes .npy alone, and believes no size
     except OSError as error:
         raise MissingFileError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (ValueError, EOFError) as error:
+    except (ValueError, EOFError, SyntaxError, TokenError) as error:
         raise DatasetError(f"{path}: this is not a NumPy file (.npy) of numbers ({error})") from error
     return stored
 

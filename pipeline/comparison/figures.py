@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from numpy.typing import NDArray
 
 from semidense.pipeline.comparison.experiments import Comparison
@@ -36,7 +37,7 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 
     """
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     over = mean_name(len(scenes))
-    means = {row["method"]: row if row["scene"] == over else {} for row in mean_rows(rows)}
+    means = {_escaped(row["method"]): row if row["scene"] == over else {} for row in mean_rows(rows)}
     drawn = new_figure(title)
     drawn.set_size_inches(width, 1.8 + 0.45 * len(means))
     axes = drawn.subplots()
@@ -47,7 +48,7 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 
         label=f"{over} scenes" if len(scenes) > 1 else scenes[0],
     )
     for method in means if len(scenes) > 1 else ():
-        values = [row[figure] for row in rows if row["method"] == method and figure in row]
+        values = [row[figure] for row in rows if _escaped(row["method"]) == method and figure in row]
         axes.plot(values, [method] * len(values), "o", color=BLUE, markersize=4, label="a scene")
     optimal = next((row["auc_optimal"] for row in means.values() if "auc_optimal" in row), None)
     if optimal is not None:
@@ -60,8 +61,18 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 
     axes.locator_params(axis="x", nbins=5)
     axes.grid(axis="x", alpha=0.3)
     handles, labels = axes.get_legend_handles_labels()
-    drawn.legend(*_first_of_each(handles, labels), loc="outside lower center", ncols=3, frameon=False)
+    _literal(drawn.legend(*_first_of_each(handles, labels), loc="outside lower center", ncols=3, frameon=False))
     return drawn
+
+
+def _escaped(name: str) -> str:
+    return name.replace("$", r"\$")
+
+
+def _literal(legend: Legend) -> None:
+    """Take the names in a legend as they are: dollars make no mathematics of them."""
+    for text in legend.get_texts():
+        text.set_parse_math(False)
 
 
 def _first_of_each(handles: Sequence[Any], labels: Sequence[str]) -> tuple[list[Any], list[str]]:
@@ -97,7 +108,7 @@ def density_figure(means: Sequence[Row]) -> Figure:
     axes.set_ylim(bottom=0)
     axes.set_xlim(left=-1)
     axes.grid(alpha=0.3)
-    axes.legend(loc="upper right", frameon=False)
+    _literal(axes.legend(loc="upper right", frameon=False))
     return drawn
 
 

@@ -112,5 +112,6 @@ def draw_any(figure: Figure, dataset: xr.Dataset) -> None:
     for each, array in zip(axes, maps, strict=True):
         values = array.values.astype(np.float32)
         draw_map(each, values, disparity_scale(values, f"{array.name} ({array.attrs.get('units', '1')})"))
-        each.set_title(str(array.attrs.get("long_name", array.name)))
-    _tell_none(figure, maps[0].values.astype(np.float32))
+        lacking = float(np.mean(~np.isfinite(values)))
+        told = f"; none: {100 * lacking:.1f} %" if lacking else ""
+        each.set_title(f"{array.attrs.get('long_name', array.name)}{told}")

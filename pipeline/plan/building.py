@@ -56,7 +56,8 @@ def build(request: Request) -> Graph:
     graph.steps = dict(sorted(graph.steps.items(), key=lambda item: place(item[1].product)))
     graph.notes = [*dict.fromkeys(graph.notes)]
     if not graph.targets:
-        raise UsageError(f"{request.dataset.spec}: no scene is left to work on; {'; '.join(graph.notes)}")
+        why = "; ".join(graph.notes) or "it has none"
+        raise UsageError(f"{request.dataset.spec}: no scene is left to work on; {why}")
     return graph
 
 

@@ -27,6 +27,9 @@ from semidense.datasets.formats.calibration.text import without_comments
 
 _NUMBERS = re.compile(r"[-+.\deE \t]+")
 
+_DIGITS = 9
+"""Of a size in pixels; a longer word is no size."""
+
 
 def is_ini(text: str) -> bool:
     """Tell whether a text has a camera as ROS writes it into an ``.ini`` file."""
@@ -51,4 +54,4 @@ def _camera(text: str) -> dict[str, Any]:
 
 
 def _whole(word: str) -> int | str:
-    return int(word) if word.isdecimal() else word
+    return int(word) if word.isdecimal() and len(word) <= _DIGITS else word

@@ -19,7 +19,7 @@ import numpy as np
 
 from semidense.datasets.errors import CalibrationError
 from semidense.datasets.formats.calibration.cameras import Cameras
-from semidense.datasets.formats.calibration.text import Matrix, matrix, without_comments
+from semidense.datasets.formats.calibration.text import Matrix, matrix, sides, without_comments
 
 _LINE = re.compile(r"^[ \t]*(\w+)[ \t]*:((?:[ \t,]+[-+.\deE]+)+)[ \t]*$", re.MULTILINE)
 _SYSTEMS = (("P1_roi", "P2_roi"), ("P_rect_02", "P_rect_03"), ("P_rect_00", "P_rect_01"), ("P2", "P3"), ("P0", "P1"))
@@ -94,7 +94,7 @@ def _size(path: Path, lines: Mapping[str, list[str]], left: str) -> tuple[int, i
     name = left.replace("P_rect", "S_rect")
     if name == left or name not in lines:
         return None
-    columns, rows = _whole(matrix(path, name, lines[name], (1, 2)))
+    columns, rows = sides(path, name, matrix(path, name, lines[name], (1, 2)))
     return rows, columns
 
 

@@ -26,17 +26,19 @@ def yaml_values(path: Path, text: str) -> dict[str, Any]:
 
     try:
         documents = yaml.safe_load_all(_plain_yaml(text))
-        return _named(path, next((found for found in documents if found is not None), None))
-    except (yaml.YAMLError, RecursionError) as error:
+        first = next((found for found in documents if found is not None), None)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise CalibrationError(f"{path}: no valid YAML ({_line(error)})") from error
+    return _named(path, first)
 
 
 def json_values(path: Path, text: str) -> dict[str, Any]:
     """Read a JSON text; raises `CalibrationError` if it is not valid, or holds no names."""
     try:
-        return _named(path, json.loads(text))
-    except (json.JSONDecodeError, RecursionError) as error:
+        found = json.loads(text)
+    except (ValueError, RecursionError) as error:
         raise CalibrationError(f"{path}: no valid JSON ({_line(error)})") from error
+    return _named(path, found)
 
 
 def toml_values(path: Path, text: str) -> dict[str, Any]:

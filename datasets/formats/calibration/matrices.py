@@ -25,7 +25,7 @@ import numpy as np
 
 from semidense.datasets.errors import CalibrationError
 from semidense.datasets.formats.calibration.cameras import VERTICAL, Cameras, unknown_format
-from semidense.datasets.formats.calibration.text import Matrix, matrix
+from semidense.datasets.formats.calibration.text import Matrix, matrix, sides
 
 _CAMERA = ("k", "camera_matrix", "cameramatrix", "intrinsics")
 _SIDES = (("left", "right"), ("cam0", "cam1"), ("left_camera", "right_camera"))
@@ -159,5 +159,6 @@ def _size(path: Path, values: Mapping[str, Any]) -> tuple[int, int] | None:
         size = [width, height]
     if size is None and shape is None:
         return None
-    first, second = matrix(path, "the image's size", _numbers(shape if size is None else size), (1, 2))[0]
-    return (int(first), int(second)) if size is None else (int(second), int(first))
+    told = "the image's size"
+    first, second = sides(path, told, matrix(path, told, _numbers(shape if size is None else size), (1, 2)))
+    return (first, second) if size is None else (second, first)

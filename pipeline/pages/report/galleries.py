@@ -74,16 +74,17 @@ def _pictures(maps: SceneMaps, filtering: SemidenseParams, rows: Sequence[Row]) 
         return
     yield confidence_picture("confidence", maps.confidence)
     by_tally = filtering.by_R and not filtering.calibrated
+    judged = [row for row in rows if (row["mask"], row["threshold_px"]) == (MASK, THRESHOLD)]
     for R in sorted({*_USUAL, filtering.R} if by_tally else _USUAL):
         kept = keep_confident(maps.disparity, maps.confidence, R)
-        yield _filtered(f"R = {R:g}", kept, span, _at(R, maps.tally.rows("", MASK, THRESHOLD) if maps.tally else ()))
+        row = _at(R, maps.tally.rows("", MASK, THRESHOLD) if maps.tally else ()) or _at(R, judged)
+        yield _filtered(f"R = {R:g}", kept, span, row)
     if not by_tally and maps.kept is not None:
-        chosen = [row for row in rows if (row["mask"], row["threshold_px"]) == (MASK, THRESHOLD)]
-        yield _filtered(filter_text(filtering), maps.kept, span, chosen[0] if chosen else None)
+        yield _filtered(filter_text(filtering), maps.kept, span, judged[0] if judged else None)
 
 
 def _at(R: float, rows: Sequence[Row]) -> Row | None:
-    return next((row for row in rows if row["R"] == R), None)
+    return next((row for row in rows if row.get("R") == R), None)
 
 
 def _span(maps: SceneMaps) -> tuple[float, float]:

@@ -45,6 +45,12 @@ def test_without_occluded_truth_all_that_is_known_is_visible(root: Path) -> None
     assert truth.mask == "non-occluded truth"
 
 
+def test_the_truth_of_hidden_pixels_alone_does_not_tell_which_are_visible(root: Path) -> None:
+    (root / "training/disp_noc_0").rename(root / "training/disp_occ_0")
+    truth = list_scenes(str(root))[0].load_truth()
+    assert truth is not None and truth.mask == "none"
+
+
 def test_with_occluded_truth_the_other_is_its_mask(root: Path) -> None:
     (root / "training/disp_occ_0").mkdir()
     for name in NAMES:

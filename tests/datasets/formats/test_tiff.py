@@ -7,7 +7,7 @@ import pytest
 import tifffile
 
 from semidense.datasets import ImageError
-from semidense.datasets.formats.tiff import write_tiff
+from semidense.datasets.formats.tiff import read_tiff, write_tiff
 
 VALUES = np.array([[0.1, np.nan, -7.25], [np.pi, 1e-30, 65504.123]], np.float32)
 
@@ -26,3 +26,18 @@ def test_what_is_no_map_is_refused_and_leaves_nothing(tmp_path: Path, bad: np.nd
     with pytest.raises(ImageError):
         write_tiff(tmp_path / "a.tif", bad)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("values", "options"),
+    [
+        pytest.param(np.int8([[9, -1, -7]]), {}, id="a sign"),
+        pytest.param(np.uint8([[9, 1, 7]]), {"photometric": "miniswhite"}, id="white as 0"),
+    ],
+)
+def test_values_that_would_come_back_as_others_are_refused(
+    tmp_path: Path, values: np.ndarray, options: dict[str, str]
+) -> None:
+    tifffile.imwrite(tmp_path / "map.tif", values, **options)
+    with pytest.raises(ImageError, match="8 bits with a sign, or white as 0"):
+        read_tiff(tmp_path / "map.tif")

@@ -12,14 +12,14 @@ from semidense.datasets import DatasetError, DisparityRange, open_dataset, write
 Save = Callable[..., Path]
 VIEWS = 'left = "left/*.png"\nright = "right/*.png"\n'
 SCENES = 'left = "scenes/*/im0.png"\nright = "scenes/*/im1.png"\n'
-TRUTH = np.array([[2, 3, np.inf, 5]] * 3, np.float32)
+TRUTH = np.array([[2, 3, np.inf, 5] * 2] * 3, np.float32)
 
 
 @pytest.fixture
 def folder(tmp_path: Path, save_image: Save) -> Path:
     for name in ("a", "b"):
         for place in (f"left/{name}.png", f"right/{name}.png", f"scenes/{name}/im0.png", f"scenes/{name}/im1.png"):
-            save_image(tmp_path / place, np.full((3, 4), 90, np.uint8))
+            save_image(tmp_path / place, np.full((3, 8), 90, np.uint8))
     for place in ("disp", "scenes/b"):
         (tmp_path / place).mkdir(exist_ok=True)
     write_pfm(tmp_path / "disp/b.pfm", TRUTH)
@@ -48,12 +48,12 @@ def test_what_is_described_is_read(folder: Path, views: str, truth: str) -> None
     loaded = other.load()
     assert loaded.truth is not None
     np.testing.assert_array_equal(loaded.truth.disparity, np.where(np.isinf(TRUTH), np.nan, TRUTH))
-    assert loaded.left.tolist() == np.full((3, 4), 90).tolist()
+    assert loaded.left.tolist() == np.full((3, 8), 90).tolist()
 
 
 def test_range_calibration_and_mask(folder: Path, save_image: Save) -> None:
     (folder / "K.txt").write_text("100 0 2 0 100 1 0 0 1 0.5")
-    save_image(folder / "mask/b.png", np.full((3, 4), 255, np.uint8))
+    save_image(folder / "mask/b.png", np.full((3, 8), 255, np.uint8))
     text = f'{VIEWS}truth = "disp/*.pfm"\nmask = "mask/*.png"\ncalib = "K.txt"\nd_min = -1\nd_max = 3\n'
     for scene in open_dataset(described(folder, text)).scenes:
         assert (scene.disparities, scene.open_ends) == (DisparityRange(-1, 3), ())
@@ -61,7 +61,7 @@ def test_range_calibration_and_mask(folder: Path, save_image: Save) -> None:
         assert scene.calibration.baseline == 500
     truth = scene.load_truth()
     assert truth is not None
-    assert (truth.mask, int(truth.nonocc.sum())) == ("published", 9)
+    assert (truth.mask, int(truth.nonocc.sum())) == ("published", 18)
 
 
 def test_the_scale_is_part_of_what_the_truth_is(folder: Path) -> None:
@@ -78,7 +78,7 @@ def test_the_scale_is_part_of_what_the_truth_is(folder: Path) -> None:
         pytest.param(VIEWS + 'd_max = "far"\n', "d_max = 'far'; expected a number", id="text for a number"),
         pytest.param(VIEWS + "d_max = true\n", "d_max = True; expected a number", id="truth for a number"),
         pytest.param(VIEWS + 'split = "val"\n', "split = 'val'; give train or test", id="split"),
-        pytest.param(VIEWS + 'truth = "disp/*.png"\n', "no scale; the truth is an image", id="no scale"),
+        pytest.param(VIEWS + 'truth = "disp/*.png"\n', "no scale; truth is an image", id="no scale"),
         pytest.param(VIEWS + "scale = 0\n", "scale = 0", id="zero scale"),
         pytest.param('left = "*/*.png"\nright = "right/*.png"\n', r"give one \*", id="two stars"),
         pytest.param('left = "none/*.png"\nright = "right/*.png"\n', "no left view", id="nothing there"),
@@ -105,3 +105,38 @@ def test_the_rendered_pair_as_a_description(stereo_data: Path, tmp_path: Path) -
     assert (scene.name, scene.size) == ("flyingthings_0032_0006", (540, 960))
     values = np.frombuffer((source / scene.name / "disp0.pfm").read_bytes()[-4 * 540 * 960 :], "<f4")
     assert scene.disparities == DisparityRange(0, int(np.ceil(values.max())))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('truth = "disp/*.png"\nscale = inf\n', "scale = inf; give the stored value of 1 px"),
+        ('truth = "disp/*.png"\nscale = nan\n', "scale = nan"),
+        ('truth = "disp/*.png"\nscale = 1e-320\n', "scale = "),
+        (f'truth = "disp/*.png"\nscale = {"9" * 5000}\n', "no valid TOML"),
+        ('truth = "disp/*.png"\nscale = 1\n', "a disparity of 80 px in an image of 8 px; give the scale"),
+        ('truth = "disp/*.pfm"\ntruth_right = "disp/*.png"\n', "no scale; truth_right is an image"),
+        ('truth = "disp/[b].pfm"\n', r"no \[, \] or"),
+    ],
+)
+def test_what_no_truth_can_be_is_refused(folder: Path, text: str, message: str) -> None:
+    with pytest.raises(DatasetError, match=message) as refused:
+        open_dataset(described(folder, VIEWS + text))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_pattern_may_begin_with_the_folder_itself_or_name_one_file(folder: Path) -> None:
+    spec = described(folder, 'left = "./left/*.png"\nright = "./right/*.png"\n')
+    assert [scene.name for scene in open_dataset(spec).scenes] == ["a", "b"]
+    spec = described(folder, 'left = "left/a.png"\nright = "right/a.png"\n')
+    assert [scene.name for scene in open_dataset(spec).scenes] == ["a"]
+
+
+def test_a_pgm_that_would_be_scaled_is_refused(folder: Path) -> None:
+    (folder / "disp/b.pgm").write_bytes(b"P5 8 3 100\n" + bytes([40] * 24))
+    spec = described(folder, f'{VIEWS}truth = "disp/*.pgm"\nscale = 16\nd_max = 5\nd_min = 0\n')
+    with pytest.raises(DatasetError, match="largest value is not 255 or 65535"):
+        open_dataset(spec).scenes[1].load_truth()
+    (folder / "disp/b.pgm").write_bytes(b"P5 # sixteenths\n8 3 255\n" + bytes([40] * 24))
+    truth = open_dataset(spec).scenes[1].load_truth()
+    assert truth is not None and (truth.disparity == 2.5).all()

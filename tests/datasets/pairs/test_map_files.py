@@ -9,7 +9,7 @@ from PIL import Image
 from semidense.datasets import write_pfm, write_png16
 from semidense.datasets.errors import DatasetError, MissingFileError
 from semidense.datasets.formats.tiff import write_tiff
-from semidense.datasets.pairs.map_files import Reading, read_map, recognised_scale
+from semidense.datasets.pairs.map_files import Reading, _read_npy, read_map, recognised_scale
 
 N = np.nan
 TRUE = np.full((40, 120), 20.5, np.float32)
@@ -129,3 +129,22 @@ def test_what_is_no_file_of_the_format_is_refused(name: str, tmp_path: Path) -> 
 def test_a_scale_that_is_none_is_refused(scale: float) -> None:
     with pytest.raises(DatasetError, match="stored value of 1 px"):
         Reading(scale=scale)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        pytest.param(b"\x93NUMPY\x01\x00\x76\x00{'shape': (1000000, ((((((" + b" " * 90 + b"\n", id="a garbled header"),
+        pytest.param(b"PK\x03\x04 several arrays", id="an archive of arrays"),
+        pytest.param(
+            b"\x93NUMPY\x01\x00\x76\x00"
+            + b"{'descr': '<f4', 'fortran_order': False, 'shape': (1000000, 1000000), }".ljust(117)
+            + b"\n1234",
+            id="more than there is",
+        ),
+    ],
+)
+def test_an_array_that_is_none_is_one_line(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "m.npy").write_bytes(content)
+    with pytest.raises(DatasetError, match="this is not a NumPy file"):
+        _read_npy(tmp_path / "m.npy")

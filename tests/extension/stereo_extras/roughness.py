@@ -7,7 +7,8 @@ from stereo_extras.declaration import RoughnessParams
 
 
 def compute_roughness(params: RoughnessParams, inputs: Inputs) -> Arrays:
-    """Return the largest step from each pixel to its neighbours, px; NaN where one has no disparity."""
+    """Return the largest step from each pixel to its neighbours, px; NaN where neither they nor it have one."""
     disparity = inputs["semidense"]["disparity"]
-    steps = [np.abs(disparity - np.roll(disparity, shift, axis=1)) for shift in (-params.reach, params.reach)]
-    return {"roughness": np.maximum(*steps)}
+    beside = np.pad(disparity, ((0, 0), (params.reach, params.reach)), constant_values=np.nan)
+    steps = [np.abs(disparity - other) for other in (beside[:, : -2 * params.reach], beside[:, 2 * params.reach :])]
+    return {"roughness": np.fmax(*steps)}

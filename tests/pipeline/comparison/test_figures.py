@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -66,3 +68,11 @@ def test_a_matcher_that_lacks_a_scene_is_no_point_beside_our_curve() -> None:
     axes = density_figure(mean_rows([*ours, *others, row("density", "a", "few", invalid=5.0, bad=2.0)])).axes[0]
     labels = [line.get_label() for line in axes.lines]
     assert "all" in labels and "few" not in labels
+
+
+def test_a_name_with_dollars_is_no_mathematics(tmp_path: Path) -> None:
+    rows = [row("auc", scene, "y$^{$", auc=0.2, auc_optimal=0.1) for scene in ("cost_$5_to_$^{9", "b")]
+    dots_figure(rows[:1], "auc", title="Areas").savefig(tmp_path / "dots.png")
+    ours = [row("curve", "a", "ours", R=R, invalid=10 * R, bad=1 - R) for R in (0.0, 0.5)]
+    density_figure(mean_rows([*ours, row("density", "a", "m$^{$", invalid=5.0, bad=2.0)])).savefig(tmp_path / "d.png")
+    assert (tmp_path / "dots.png").stat().st_size > 1000 and (tmp_path / "d.png").stat().st_size > 1000

@@ -167,8 +167,8 @@ def test_a_calibration_of_another_size_is_refused(taken: Path, tmp_path: Path) -
         ({"R": np.zeros((3, 3)).tolist()}, "R is no rotation"),
         ({"R": np.diag([1, 1, -1]).tolist()}, "R is no rotation"),
         ({"M1": np.zeros((3, 3)).tolist()}, "M1 is no camera matrix"),
-        ({"D1": [[0, 0], [0]]}, "D1 holds something else than numbers"),
-        ({"D2": ["a", "b", "c", "d"]}, "D2 holds something else than numbers"),
+        ({"D1": [[0, 0], [0]]}, "D1 is no list of 4, 5, 8, 12 or 14 numbers"),
+        ({"D2": ["a", "b", "c", "d"]}, "D2 is no list of 4, 5, 8, 12 or 14 numbers"),
         ({"image_width": "wide", "image_height": 3}, "3 x wide|wide"),
     ],
 )

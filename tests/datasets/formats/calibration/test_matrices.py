@@ -1,5 +1,6 @@
 """OpenCV's files and JSON: f 500 px, baseline 120 mm, centres 311 and 341."""
 
+import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -177,3 +178,32 @@ def test_a_real_rectification_gives_the_depth_that_opencv_gives(tmp_path: Path) 
         known = read_cameras([saved(tmp_path, values)], "m").calibration
         z = geometry.depth(disparity, known.focal, known.baseline / 1000, known.doffs)
         assert np.allclose(geometry.points(z, known.focal, known.centre)[0] * [1, -1, -1], expected, rtol=1e-4)
+
+
+@pytest.mark.parametrize("size", [[0, 0], [640.7, 480], [-4, 5]])
+def test_a_size_that_no_image_has_is_refused(tmp_path: Path, size: list[float]) -> None:
+    with pytest.raises(CalibrationError, match="the image's size is .* expected whole numbers of pixels"):
+        read_cameras([saved(tmp_path, SIMPLE | {"unit": "m", "width": size[0], "height": size[1]})])
+
+
+def test_lists_that_hold_each_other_are_not_walked_to_their_end(tmp_path: Path) -> None:
+    names = "abcdefghijklmnop"
+    lines = [f"a: &a [{', '.join(['1'] * 9)}]"]
+    lines += [f"{new}: &{new} [{', '.join(['*' + old] * 9)}]" for old, new in itertools.pairwise(names)]
+    (tmp_path / "c.yml").write_text("%YAML:1.0\n---\n" + "\n".join([*lines, "P1: *p", "P2: *p"]))
+    with pytest.raises(CalibrationError, match="P1 is no matrix of 3 x 4 numbers"):
+        read_cameras([tmp_path / "c.yml"], "m")
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        pytest.param("c.yml", "%YAML:1.0\n---\ndate: 2020-13-45\n", id="an impossible date"),
+        pytest.param("c.json", f'{{"fx": {"9" * 5000}}}', id="JSON with too many digits"),
+        pytest.param("c.yml", f"%YAML:1.0\n---\nfx: {'9' * 5000}\n", id="YAML with too many digits"),
+    ],
+)
+def test_a_value_that_cannot_be_is_one_line(tmp_path: Path, name: str, text: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(CalibrationError, match="no valid (YAML|JSON)"):
+        read_cameras([tmp_path / name])
