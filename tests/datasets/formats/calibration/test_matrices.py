@@ -182,7 +182,7 @@ def test_a_real_rectification_gives_the_depth_that_opencv_gives(tmp_path: Path) 
 
 @pytest.mark.parametrize("size", [[0, 0], [640.7, 480], [-4, 5]])
 def test_a_size_that_no_image_has_is_refused(tmp_path: Path, size: list[float]) -> None:
-    with pytest.raises(CalibrationError, match="the image's size is .* expected whole numbers of pixels"):
+    with pytest.raises(CalibrationError, match=r"the image's size is .* expected whole numbers of pixels"):
         read_cameras([saved(tmp_path, SIMPLE | {"unit": "m", "width": size[0], "height": size[1]})])
 
 
@@ -205,5 +205,5 @@ def test_lists_that_hold_each_other_are_not_walked_to_their_end(tmp_path: Path) 
 )
 def test_a_value_that_cannot_be_is_one_line(tmp_path: Path, name: str, text: str) -> None:
     (tmp_path / name).write_text(text)
-    with pytest.raises(CalibrationError, match="no valid (YAML|JSON)"):
+    with pytest.raises(CalibrationError, match=r"no valid (YAML|JSON)"):
         read_cameras([tmp_path / name])
