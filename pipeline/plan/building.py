@@ -177,7 +177,8 @@ class _Builder:
         if missing or stage.scope != own.scope or product in made_from(other):
             why = f"it has no array {missing[0]!r} with its dimensions" if missing else f"it is made from {product}"
             raise UsageError(f"use.{product} = {other!r}: {other} cannot take the place of {product}, {why}")
-        return replace(stage, product=product), self.config.section(stage.section or other)
+        stage = replace(stage, product=product, section=stage.section or other)
+        return stage, self.config.section(stage.section)
 
     def _inputs(self, stage: Stage, product: str, scene: SceneSource | None) -> tuple[str, ...]:
         if not (stage.scope == "split" and scope_of(product) == "scene"):

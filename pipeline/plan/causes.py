@@ -47,7 +47,7 @@ class Causes:
         elif part == "inputs":
             yield from self._input(name, change)
         else:
-            yield self._own(step.product, change, getattr(step.argument, "files", {}))
+            yield self._own(step.stage.section or step.product, change, getattr(step.argument, "files", {}))
 
     def _own(self, product: str, change: Change, files: Mapping[str, Path]) -> str:
         """Return one line for a change of a recipe's own ingredient."""

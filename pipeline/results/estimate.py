@@ -194,7 +194,8 @@ def _count(settings: Mapping[str, Any]) -> int | None:
 def _alike(entry: Entry, step: Step) -> bool:
     if step.size is None:
         return not _differing(entry, step)
-    return _pixels(entry) > 0 and entry.recipe.params.get("mode") == step.settings.get("mode")
+    by_it = step.stage.module in entry.recipe.code  # another stage may make the product, which ``use`` names
+    return by_it and _pixels(entry) > 0 and entry.recipe.params.get("mode") == step.settings.get("mode")
 
 
 def _differing(entry: Entry, step: Step) -> list[str]:

@@ -11,6 +11,7 @@ from semidense.pipeline.api import Task, open_store, parse_thresholds, sweep_req
 from semidense.pipeline.cli.options import chosen_preset
 from semidense.pipeline.plan.config import Settings
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.results.estimate import estimate
 from semidense.pipeline.results.opening import open_product, recorded
 from semidense.pipeline.results.result import Result
 from semidense.stages.stage import StageError
@@ -321,3 +322,13 @@ def test_every_verb_is_offered_under_its_name() -> None:
 
     assert set(pipeline.__all__) <= set(dir(pipeline))
     assert all(getattr(pipeline, name).__name__ == name for name in pipeline.__all__)
+
+
+def test_a_stage_that_takes_the_place_of_another_is_told_by_its_own_settings(tmp_path: Path) -> None:
+    task = Task(TEST_ONLY, cache=tmp_path, settings=["use.disparity=aggregated", "costvolume.mode=fast"])
+    api.run(task.and_settings(["use.disparity=disparity"]), "disparity")
+    expected = estimate(api.status(task, "disparity"), open_store(tmp_path))
+    assert expected.unknown == ("disparity",), "the time of the winner of single costs says nothing of the sums"
+    api.run(task, "disparity")
+    changed = api.status(task.and_settings(["aggregated.passes=2"]), "disparity").steps[-1]
+    assert (changed.step.product, changed.causes) == ("disparity", ("aggregated.passes: 1 -> 2",))

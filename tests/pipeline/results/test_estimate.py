@@ -40,7 +40,7 @@ def remember(store: Store) -> Remember:
         inputs: Mapping[str, str] | None = None,
         **settings: object,
     ) -> str:
-        recipe = Recipe(stage, {"code": "1f" * 32}, settings, inputs or {}, {})
+        recipe = Recipe(stage, {COSTS.stage.module: "1f" * 32}, settings, inputs or {}, {})
         with store.begin(recipe, {"product": stage, "scene": "Old"}) as draft:
             draft.create_array("values", (1,), "float64", (1,), ("one",), {})
             draft.write("values", (slice(None),), np.array([seconds]))
