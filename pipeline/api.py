@@ -34,8 +34,6 @@ def open_store(folder: Path | str | None = None) -> Store:
     from platformdirs import user_cache_path
 
     chosen = str(folder or os.environ.get(CACHE_VARIABLE) or user_cache_path("semidense-stereo", appauthor=False))
-    if chosen.startswith("memory:"):
-        raise UsageError(f"cache {chosen}: it would end with this process; name a folder or an object store")
     return Store(chosen if "://" in chosen else user_path(chosen))
 
 

@@ -44,10 +44,20 @@ ConfigOption = Annotated[
         "./pipeline.toml if there is one].",
     ),
 ]
+
+
+def _lasting(cache: str | None) -> str | None:
+    """Refuse a cache that would end with the command."""
+    if cache and cache.startswith("memory:"):
+        raise typer.BadParameter(f"{cache} ends with the command; name a folder or an object store")
+    return cache
+
+
 CacheOption = Annotated[
     str | None,  # a path would lose one of a URL's slashes
     typer.Option(
         "--cache",
+        callback=_lasting,
         metavar="FOLDER|URL",
         help="Folder of the cache, or a URL: s3://, gs:// or az:// [default: $PIPELINE_CACHE, else your user cache "
         "folder].",

@@ -57,11 +57,6 @@ def test_what_a_run_does_not_make_cannot_be_forced(tmp_path: Path) -> None:
         api.status(SPEC, "channels", forced=["metrics"], cache=tmp_path)
 
 
-def test_a_cache_in_memory_is_refused() -> None:
-    with pytest.raises(UsageError, match="memory://x: it would end with this process"):
-        open_store("memory://x")
-
-
 @pytest.mark.parametrize("setting", ["weights.matching_net", "config"])
 def test_a_pipe_keeps_no_plan_waiting(tmp_path: Path, setting: str) -> None:
     pipe = tmp_path / ("c.json" if setting == "config" else "w.safetensors")

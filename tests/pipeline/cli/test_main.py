@@ -273,6 +273,7 @@ def test_a_file_that_ends_too_early_is_a_fault_and_no_wish_to_stop(
         (["macth"], "pipeline: No such command 'macth'"),
         (["run", "--prest", "robust"], "pipeline: No such option: --prest"),
         (["match", "a.png", "b.png", "--R", "90%"], "pipeline: Invalid value for '--R'"),
+        (["run", "--cache", "memory://x"], "pipeline: Invalid value for '--cache': memory://x ends with the command"),
         (["score", "a.png"], "pipeline: Missing argument 'disparity'; see `pipeline score --help`"),
         (["run", "motorcycle", "more"], "pipeline: Got unexpected extra argument(s) (more); see `pipeline run --help`"),
     ],
