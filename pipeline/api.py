@@ -1,12 +1,10 @@
 """The verbs of the command line as functions. Products come back as lazy xarray datasets."""
 
 import functools
-import itertools
 import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from numbers import Real
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
@@ -16,14 +14,15 @@ from semidense.datasets.formats.files import user_path
 from semidense.pipeline.execution.retry import attempt
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.execution.watch import Unwatched, Watch
-from semidense.pipeline.plan.config import Config, Settings, alternatives, setting_texts, value_text
-from semidense.pipeline.plan.errors import UsageError, shortened
+from semidense.pipeline.plan.config import Config, Settings, setting_texts
+from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made, Plan, Planned, close_ranges, make_plan
 from semidense.pipeline.plan.presets import DEFAULT
 from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.plan.training_split import training_scenes
 from semidense.pipeline.results.metric_rows import METHOD
 from semidense.pipeline.results.result import Result
+from semidense.pipeline.variants import variants_of
 from semidense.stages.evaluation.filtering import SemidenseParams
 
 CACHE_VARIABLE = "PIPELINE_CACHE"
@@ -248,58 +247,10 @@ def sweep(
 
 def sweep_request(task: Task, R: str | float | Sequence[float], over: Mapping[str, object] | Sequence[str]) -> Request:
     """Return the request of a sweep; see ``sweep``."""
-    thresholds, combined = [f"semidense.R={value!r}" for value in parse_thresholds(R)], _combined(over)
-    if any(setting.partition("=")[0] == "semidense.R" for values in combined for setting in values):
-        raise UsageError("semidense.R is swept by R; give its values there")
+    variants = variants_of(R, over)
     if not task.configuration().of("semidense", SemidenseParams).by_R:
         raise UsageError("semidense.density and semidense.max_error replace R, which is swept; leave them out")
-    variants = [(threshold, *combination) for combination in itertools.product(*combined) for threshold in thresholds]
     return task.request("metrics", variants)
-
-
-def _combined(over: Mapping[str, object] | Sequence[str]) -> list[list[str]]:
-    """Return each swept setting as one text a value."""
-    if isinstance(over, Mapping):
-        return [[f"{name}={value_text(name, value)}" for value in _several(values)] for name, values in over.items()]
-    return [alternatives(setting) for setting in over]
-
-
-def _several(values: object) -> Sequence[object]:
-    """Return the values of a setting that is swept; one that stands alone, as one."""
-    return values if isinstance(values, Sequence) and not isinstance(values, str) else [values]
-
-
-def parse_thresholds(R: str | float | Sequence[float]) -> list[float]:
-    """Return the thresholds that ``first:last:step``, ``value,value``, a number or a sequence names.
-
-    Raises:
-        UsageError: if it is none of these, or a threshold lies outside [0, 1].
-
-    >>> parse_thresholds("0.1:0.3:0.1")
-    [0.1, 0.2, 0.3]
-    """
-    try:
-        R = [float(R)] if isinstance(R, int | float | Real) else R
-        values = _span(R) if isinstance(R, str) and ":" in R else _list(R)
-    except ValueError:
-        raise UsageError(f"R = {shortened(R)}: write a number, numbers with commas, or first:last:step") from None
-    outside = [value for value in values if not 0 <= value <= 1]
-    if outside or not values:
-        raise UsageError(
-            f"R = {shortened(R)}: every threshold must lie in [0, 1]" + (f", not {outside[0]:g}" if outside else "")
-        )
-    return values
-
-
-def _span(text: str) -> list[float]:
-    first, last, step = (float(part) for part in text.split(":"))
-    if step <= 0 or last < first or (last - first) / step > 1000:
-        raise ValueError
-    return [round(first + index * step, 10) for index in range(int((last - first) / step + 1e-9) + 1)]
-
-
-def _list(R: str | Sequence[float]) -> list[float]:
-    return [float(part) for part in (R.split(",") if isinstance(R, str) else R)]
 
 
 def explain(dataset: Data | Task, product: str, scene: str | None = None, **options: Unpack[Options]) -> Planned:

@@ -18,18 +18,15 @@ from semidense.datasets.pairs.options import PairOptions, pair_spec
 from semidense.pipeline.api import Task, run, status
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import findings, without_texture
-from semidense.pipeline.pairs.wishes import Wishes
-from semidense.pipeline.plan.config import Config, Settings
+from semidense.pipeline.pairs.wishes import Wishes, wished
+from semidense.pipeline.plan.config import Settings
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.presets import OWN_PAIRS
-from semidense.pipeline.plan.shipped_weights import weights_of
 from semidense.pipeline.plan.steps import SPLIT
 from semidense.pipeline.results.result import Result
 from semidense.stages.disparity import depth as geometry
-from semidense.stages.disparity.declaration import AggregatedParams, DisparityParams
 from semidense.stages.evaluation.calibration.table import Outcome, Table, outcome
-from semidense.stages.evaluation.filtering import SemidenseParams
 
 Unit = Literal["mm", "cm", "m"]
 
@@ -256,31 +253,6 @@ def _dataset(left: object, right: object, options: PairOptions) -> Dataset:
     if isinstance(left, str | PathLike) and isinstance(right, str | PathLike):
         return open_dataset(pair_spec([fspath(left), fspath(right)], options))
     return array_pair(left, right, options)
-
-
-def wished(task: Task, wishes: Wishes) -> Task:
-    """Return the task with the settings that the wishes come down to, checked before any image is read.
-
-    A map whose disparities lie below a pixel already is not refined again.
-
-    Raises:
-        UsageError: if a setting is not valid.
-        StageError: if the wishes need a calibration, and none is known for such maps.
-    """
-    task = task.and_settings(wishes.settings)
-    config = task.configuration()
-    filtered_by = config.of("semidense", SemidenseParams)
-    calibrated = filtered_by.calibrated or filtered_by.max_error is not None
-    if calibrated and not config.choice("use", "calibrated_confidence"):
-        weights_of(config, "calibration")
-    return task.and_settings(["refined.subpixel=false"]) if wishes.subpixel and _below_a_pixel(config) else task
-
-
-def _below_a_pixel(config: Config) -> bool:
-    """Return whether the raw map is refined where its winner is found."""
-    if config.choice("use", "disparity") == "aggregated":
-        return config.of("aggregated", AggregatedParams).subpixel
-    return config.of("disparity", DisparityParams).subpixel
 
 
 def match_all(

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semidense.pipeline.api import Task
-from semidense.pipeline.pairs.match import match, wished
-from semidense.pipeline.pairs.wishes import Wishes
+from semidense.pipeline.pairs.match import match
+from semidense.pipeline.pairs.wishes import Wishes, wished
 from semidense.pipeline.plan.config import Settings, setting_texts
 from semidense.pipeline.plan.errors import UsageError, nearest
 from semidense.pipeline.plan.presets import OWN_PAIRS

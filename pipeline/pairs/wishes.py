@@ -2,7 +2,12 @@
 
 from dataclasses import dataclass
 
+from semidense.pipeline.api import Task
+from semidense.pipeline.plan.config import Config
 from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.shipped_weights import weights_of
+from semidense.stages.disparity.declaration import AggregatedParams, DisparityParams
+from semidense.stages.evaluation.filtering import SemidenseParams
 
 
 @dataclass(frozen=True)
@@ -64,3 +69,28 @@ class Wishes:
         if self.subpixel:
             given |= {"refined.subpixel": True}
         return tuple(f"{name}={str(value).lower()}" for name, value in given.items() if value is not None)
+
+
+def wished(task: Task, wishes: Wishes) -> Task:
+    """Return the task with the settings that the wishes come down to, checked before any image is read.
+
+    A map whose disparities lie below a pixel already is not refined again.
+
+    Raises:
+        UsageError: if a setting is not valid.
+        StageError: if the wishes need a calibration, and none is known for such maps.
+    """
+    task = task.and_settings(wishes.settings)
+    config = task.configuration()
+    filtered_by = config.of("semidense", SemidenseParams)
+    calibrated = filtered_by.calibrated or filtered_by.max_error is not None
+    if calibrated and not config.choice("use", "calibrated_confidence"):
+        weights_of(config, "calibration")
+    return task.and_settings(["refined.subpixel=false"]) if wishes.subpixel and _below_a_pixel(config) else task
+
+
+def _below_a_pixel(config: Config) -> bool:
+    """Return whether the raw map is refined where its winner is found."""
+    if config.choice("use", "disparity") == "aggregated":
+        return config.of("aggregated", AggregatedParams).subpixel
+    return config.of("disparity", DisparityParams).subpixel

@@ -56,8 +56,7 @@ def build(request: Request) -> Graph:
     graph.steps = dict(sorted(graph.steps.items(), key=lambda item: place(item[1].product)))
     graph.notes = [*dict.fromkeys(graph.notes)]
     if not graph.targets:
-        why = "; ".join(graph.notes) or "it has none"
-        raise UsageError(f"{request.dataset.spec}: no scene is left to work on; {why}")
+        raise UsageError(f"{request.dataset.spec}: no scene is left to work on; {'; '.join(graph.notes) or 'none'}")
     return graph
 
 
@@ -119,8 +118,7 @@ class _Builder:
         """Add a product of each training scene that was asked for, made by networks that have not seen it."""
         dataset = self.request.dataset
         judged = held_out_scenes(self.config, dataset, self._mapped() if self.request.train else ())
-        asked = sum(scene.split == "train" for scene in dataset.scenes)
-        if len(judged) < asked:
+        if len(judged) < (asked := sum(scene.split == "train" for scene in dataset.scenes)):
             self.graph.notes.append(
                 f"training.held_out judges {len(judged)} of {asked} training scenes: those that the confidence "
                 "learns from (training.maps says how many of each data set)"
@@ -186,10 +184,7 @@ class _Builder:
         if not any("costvolume" in made_from(each) for each in stage.inputs):
             return tuple(self.product(product, source) for source in self.request.training)
         if self.request.training and not self._mapped():
-            raise UsageError(
-                f"{stage.product}: the scenes that the confidence learns from are all in one fold; give another number "
-                "of them (training.maps) or of folds (calibration.folds)"
-            )
+            raise UsageError(f"{stage.product}: its maps are of one fold; change training.maps or calibration.folds")
         cross_fitted = stage.cross_fitted or self.config.training.cross_fit
         return tuple(
             (self._not_having_seen(source) if cross_fitted else self).product(product, source)

@@ -14,6 +14,8 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from semidense.datasets import DatasetError
+from semidense.datasets.formats.files import read_text
 from semidense.pipeline.plan import presets
 from semidense.pipeline.plan.errors import UsageError, nearest, shortened
 from semidense.stages.catalog import STAGES
@@ -138,15 +140,17 @@ def _choices(name: str, products: Iterable[str]) -> type[Params]:
 
 def _read_file(file: Path) -> dict[str, Any]:
     """Return the sections of a TOML file, or of the JSON file that a run or a match wrote beside its results."""
-    return _read_exported(file) if file.suffix == ".json" else _read_toml(file)
+    try:
+        text = read_text(file, LONGEST_FILE, DatasetError, "configuration")
+    except DatasetError as error:
+        raise UsageError(f"configuration {error}") from None
+    return _read_exported(file, text) if file.suffix == ".json" else _read_toml(file, text)
 
 
-def _read_exported(file: Path) -> dict[str, Any]:
+def _read_exported(file: Path, text: str) -> dict[str, Any]:
     """Return the settings of a ``config.json`` or ``summary.json``, without ranges: each scene has its own."""
     try:
-        found = [_set_by_users(each["sections"]) for each in json.loads(_text_of(file))["configuration"]]
-    except UsageError:
-        raise
+        found = [_set_by_users(each["sections"]) for each in json.loads(text)["configuration"]]
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
         raise UsageError(f"configuration {file}: it is no config.json or summary.json of this version") from None
     if not found or any(each != found[0] for each in found):
@@ -165,26 +169,13 @@ def _set_by_users(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _read_toml(file: Path) -> dict[str, Any]:
+def _read_toml(file: Path, text: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(_text_of(file))
+        return tomllib.loads(text)
     except RecursionError:
         raise UsageError(f"configuration {file}: it is nested too deeply") from None
-    except UsageError:
-        raise
     except ValueError as error:  # of a number with too many digits, a plain one
         raise UsageError(f"configuration {file}: {error}") from None
-
-
-def _text_of(file: Path) -> str:
-    try:
-        if file.exists() and not (file.is_file() or file.is_dir()):  # a pipe would keep us waiting
-            raise UsageError(f"configuration {file}: it is not a plain file")
-        if file.stat().st_size > LONGEST_FILE:
-            raise UsageError(f"configuration {file}: it has more than {LONGEST_FILE:,} bytes; is it the right file?")
-        return file.read_text()
-    except OSError as error:
-        raise UsageError(f"configuration {file}: {error.strerror or error}") from None
 
 
 def setting_texts(settings: Settings) -> tuple[str, ...]:

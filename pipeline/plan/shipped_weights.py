@@ -8,7 +8,8 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from semidense.datasets.formats.files import user_path
+from semidense.datasets import DatasetError
+from semidense.datasets.formats.files import read_bytes, user_path
 from semidense.pipeline.plan.config import Config
 from semidense.stages.catalog import STAGES
 from semidense.stages.evaluation.calibration.declaration import CalibrationParams
@@ -103,17 +104,12 @@ def own_weights(product: str, file: Path) -> Weights:
 
 
 def _bytes_of(product: str, file: Path) -> bytes:
-    from semidense.stages.weights import LARGEST  # torch takes a second to load
+    from semidense.stages.weights import LARGEST  # loads torch
 
-    told = f"weights.{product} = {file}"
-    if file.exists() and not (file.is_file() or file.is_dir()):  # a pipe would keep us waiting
-        raise StageError(f"{told}: it is not a plain file")
     try:
-        if file.stat().st_size <= LARGEST:
-            return file.read_bytes()
-    except (OSError, ValueError) as error:
-        raise StageError(f"{told}: {getattr(error, 'strerror', None) or error}") from None
-    raise StageError(f"{told}: it has more than {LARGEST:,} bytes; is it the right file?")
+        return read_bytes(file, LARGEST, DatasetError, "network")
+    except ValueError as error:  # a DatasetError, or a path with a null byte
+        raise StageError(f"weights.{product} = {error}") from None
 
 
 def weights_name(

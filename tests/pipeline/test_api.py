@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from semidense.pipeline import api
-from semidense.pipeline.api import Task, open_store, parse_thresholds, sweep_request
+from semidense.pipeline.api import Task, open_store, sweep_request
 from semidense.pipeline.cli.options import chosen_preset
 from semidense.pipeline.plan.config import Settings
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.estimate import estimate
 from semidense.pipeline.results.opening import open_product, recorded
 from semidense.pipeline.results.result import Result
+from semidense.pipeline.variants import parse_thresholds
 from semidense.stages.stage import StageError
 from tests.tiny import SPEC, TEST_ONLY
 
@@ -62,7 +63,7 @@ def test_a_pipe_keeps_no_plan_waiting(tmp_path: Path, setting: str) -> None:
     pipe = tmp_path / ("c.json" if setting == "config" else "w.safetensors")
     os.mkfifo(pipe)
     how = {"config": pipe} if setting == "config" else {"settings": [f"{setting}={pipe}"]}
-    with pytest.raises((UsageError, StageError), match="it is not a plain file"):
+    with pytest.raises((UsageError, StageError), match="cannot be read .a pipe or a device"):
         api.status(TEST_ONLY, cache=tmp_path / "cache", **how)
     assert chosen_preset(None, tmp_path / "c.json") == "paper"
 

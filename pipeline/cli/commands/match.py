@@ -153,7 +153,7 @@ def match(
 def _plan(task: "Task", wishes: "Wishes", as_json: bool) -> None:
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
-    from semidense.pipeline.pairs.match import wished
+    from semidense.pipeline.pairs.wishes import wished
 
     plan = api.status(wished(task, wishes), wishes.product)
     console.show_plan(plan, api.open_store(task.cache), as_json)

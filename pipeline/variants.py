@@ -1,0 +1,68 @@
+"""What a sweep tries: thresholds R, and values of settings, in all combinations."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from numbers import Real
+
+from semidense.pipeline.plan.config import alternatives, value_text
+from semidense.pipeline.plan.errors import UsageError, shortened
+
+
+def variants_of(R: str | float | Sequence[float], over: Mapping[str, object] | Sequence[str]) -> list[tuple[str, ...]]:
+    """Return the settings of each variant, as texts: a threshold, and a value of each setting that is swept.
+
+    Raises:
+        UsageError: if a threshold is none, or R is swept in two ways.
+
+    >>> variants_of("0.1,0.2", {"channels.rank_window": 15})
+    [('semidense.R=0.1', 'channels.rank_window=15'), ('semidense.R=0.2', 'channels.rank_window=15')]
+    """
+    thresholds, combined = [f"semidense.R={value!r}" for value in parse_thresholds(R)], _combined(over)
+    if any(setting.partition("=")[0] == "semidense.R" for values in combined for setting in values):
+        raise UsageError("semidense.R is swept by R; give its values there")
+    return [(threshold, *combination) for combination in itertools.product(*combined) for threshold in thresholds]
+
+
+def _combined(over: Mapping[str, object] | Sequence[str]) -> list[list[str]]:
+    """Return each swept setting as one text a value."""
+    if isinstance(over, Mapping):
+        return [[f"{name}={value_text(name, value)}" for value in _several(values)] for name, values in over.items()]
+    return [alternatives(setting) for setting in over]
+
+
+def _several(values: object) -> Sequence[object]:
+    """Return the values of a setting that is swept; one that stands alone, as one."""
+    return values if isinstance(values, Sequence) and not isinstance(values, str) else [values]
+
+
+def parse_thresholds(R: str | float | Sequence[float]) -> list[float]:
+    """Return the thresholds that ``first:last:step``, ``value,value``, a number or a sequence names.
+
+    Raises:
+        UsageError: if it is none of these, or a threshold lies outside [0, 1].
+
+    >>> parse_thresholds("0.1:0.3:0.1")
+    [0.1, 0.2, 0.3]
+    """
+    try:
+        R = [float(R)] if isinstance(R, int | float | Real) else R
+        values = _span(R) if isinstance(R, str) and ":" in R else _list(R)
+    except ValueError:
+        raise UsageError(f"R = {shortened(R)}: write a number, numbers with commas, or first:last:step") from None
+    outside = [value for value in values if not 0 <= value <= 1]
+    if outside or not values:
+        raise UsageError(
+            f"R = {shortened(R)}: every threshold must lie in [0, 1]" + (f", not {outside[0]:g}" if outside else "")
+        )
+    return values
+
+
+def _span(text: str) -> list[float]:
+    first, last, step = (float(part) for part in text.split(":"))
+    if step <= 0 or last < first or (last - first) / step > 1000:
+        raise ValueError
+    return [round(first + index * step, 10) for index in range(int((last - first) / step + 1e-9) + 1)]
+
+
+def _list(R: str | Sequence[float]) -> list[float]:
+    return [float(part) for part in (R.split(",") if isinstance(R, str) else R)]
