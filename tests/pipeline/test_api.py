@@ -63,7 +63,7 @@ def test_a_pipe_keeps_no_plan_waiting(tmp_path: Path, setting: str) -> None:
     pipe = tmp_path / ("c.json" if setting == "config" else "w.safetensors")
     os.mkfifo(pipe)
     how = {"config": pipe} if setting == "config" else {"settings": [f"{setting}={pipe}"]}
-    with pytest.raises((UsageError, StageError), match="cannot be read .a pipe or a device"):
+    with pytest.raises((UsageError, StageError), match=r"cannot be read .a pipe or a device"):
         api.status(TEST_ONLY, cache=tmp_path / "cache", **how)
     assert chosen_preset(None, tmp_path / "c.json") == "paper"
 

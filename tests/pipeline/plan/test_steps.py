@@ -167,7 +167,7 @@ def test_held_out_scenes_are_judged_by_networks_that_have_not_seen_them() -> Non
 def test_folds_of_which_one_has_all_the_maps_are_refused() -> None:
     many = open_dataset("synthetic:train=4,test=1,height=64,width=80,disparities=8")
     config = Config.load(None, ["training.maps=2"])
-    with pytest.raises(UsageError, match="its maps are of one fold; change training.maps"):
+    with pytest.raises(UsageError, match=r"its maps are of one fold; change training\.maps"):
         build(Request(many, {"": config}, "calibrated_confidence", True, training_scenes(many)))
 
 
