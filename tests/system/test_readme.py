@@ -86,8 +86,8 @@ def test_a_command_that_is_none_does_not_parse(line: str) -> None:
 
 @pytest.mark.parametrize("line", COMMANDS)
 def test_the_settings_and_thresholds_of_the_readme_are_valid(line: str) -> None:
-    from semidense.pipeline.variants import parse_thresholds
     from semidense.pipeline.plan.config import Config, alternatives
+    from semidense.pipeline.variants import parse_thresholds
 
     arguments = shlex.split(line, comments=True)
     given = list(pairwise(arguments))
