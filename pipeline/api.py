@@ -26,6 +26,7 @@ from semidense.pipeline.variants import variants_of
 from semidense.stages.evaluation.filtering import SemidenseParams
 
 CACHE_VARIABLE = "PIPELINE_CACHE"
+_INSTEAD_OF_R = ("semidense.density", "semidense.max_error")
 
 
 def open_store(folder: Path | str | None = None) -> Store:
@@ -248,8 +249,10 @@ def sweep(
 def sweep_request(task: Task, R: str | float | Sequence[float], over: Mapping[str, object] | Sequence[str]) -> Request:
     """Return the request of a sweep; see ``sweep``."""
     variants = variants_of(R, over)
-    if not task.configuration().of("semidense", SemidenseParams).by_R:
-        raise UsageError("semidense.density and semidense.max_error replace R, which is swept; leave them out")
+    swept = {setting.partition("=")[0] for variant in variants for setting in variant}
+    decided = not task.configuration().of("semidense", SemidenseParams).by_R or swept & set(_INSTEAD_OF_R)
+    if decided and len({threshold for threshold, *_ in variants}) > 1:
+        raise UsageError(f"{' and '.join(_INSTEAD_OF_R)} replace R, so several R give the same map; give one")
     return task.request("metrics", variants)
 
 

@@ -13,7 +13,7 @@ _NEARLY_ALL = 0.9
 _TAIL = 15
 _SILENT = 0.01
 _BEYOND = 0.05
-"""Share of the matches outside the range that was searched; it is 0.00 to 0.03 where the range is the truth's."""
+"""Share of the matches outside the range that was searched from which on it is told; stray ones are fewer."""
 _LEAST_OFFSET = 1.0
 """A vertical offset below this does no harm: a patch is 11 px high."""
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from semidense.datasets.errors import CalibrationError
 from semidense.datasets.formats.calibration.cameras import MILLIMETRES, Cameras, calibrated
 from semidense.datasets.formats.calibration.markup import markup_values
-from semidense.datasets.formats.calibration.text import Matrix, flat, matrix, read_text
+from semidense.datasets.formats.calibration.text import Matrix, floats, matrix, read_text
 from semidense.datasets.formats.images import read_image
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.files.publishing import publishing
@@ -186,7 +186,7 @@ def _distortion(path: Path, values: Mapping[str, Any], name: str) -> Matrix:
     found = _value(values, name)
     if found is None:
         return np.zeros((1, 5))
-    count = flat(found, _DISTORTIONS[-1] + 1).size if isinstance(found, list) else 0
+    count = floats(found).size if isinstance(found, list) else 0
     if count not in _DISTORTIONS:
         raise CalibrationError(
             f"{path}: {name.upper()} is no list of 4, 5, 8, 12 or 14 numbers, which OpenCV's models have "

@@ -43,8 +43,11 @@ def test_what_a_sweep_cannot_sweep_is_refused() -> None:
         sweep_request(task, 0.5, {"training.dataset": [SPEC, f"{SPEC},seed=2"]})
     with pytest.raises(UsageError, match=r"semidense\.R is swept by R"):
         sweep_request(task, 0.5, {"semidense.R": [0.2, 0.3]})
-    with pytest.raises(UsageError, match="replace R, which is swept"):
+    with pytest.raises(UsageError, match="replace R, so several R give the same map"):
         sweep_request(task.and_settings(["semidense.density=0.5"]), "0.1,0.5", ())
+    with pytest.raises(UsageError, match="replace R, so several R give the same map"):
+        sweep_request(task, "0.1,0.5", {"semidense.density": [0.5, 0.6]})
+    assert len(sweep_request(task, 0.9, {"semidense.density": [0.5, 0.6]}).configs) == 2
 
 
 def test_a_product_of_training_scenes_needs_some(tmp_path: Path) -> None:

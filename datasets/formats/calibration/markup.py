@@ -9,6 +9,9 @@ from xml.etree import ElementTree
 
 from semidense.datasets.errors import CalibrationError
 
+_MOST_VALUES = 1 << 18
+"""Values that a file can hold without aliases: it has no more bytes."""
+
 
 def markup_values(path: Path, text: str) -> dict[str, Any]:
     """Read XML or JSON, told by its first sign, else YAML; raises `CalibrationError` if it is not valid."""
@@ -29,6 +32,7 @@ def yaml_values(path: Path, text: str) -> dict[str, Any]:
         first = next((found for found in documents if found is not None), None)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise CalibrationError(f"{path}: no valid YAML ({_line(error)})") from error
+    _require_small(path, first)
     return _named(path, first)
 
 
@@ -56,6 +60,16 @@ def xml_values(path: Path, text: str) -> dict[str, Any]:
     except (ElementTree.ParseError, ValueError) as error:
         raise CalibrationError(f"{path}: damaged XML ({_line(error)})") from error
     return {element.tag: (element.findtext("data") or element.text or "").split() for element in root}
+
+
+def _require_small(path: Path, found: object) -> None:
+    """Refuse values that hold each other many times over, as aliases let them: written out they fill all memory."""
+    waiting, seen = [found], 0
+    while waiting:
+        each, seen = waiting.pop(), seen + 1
+        if seen > _MOST_VALUES:
+            raise CalibrationError(f"{path}: its aliases stand for more than {_MOST_VALUES:,} values; write them out")
+        waiting += each.values() if isinstance(each, dict) else each if isinstance(each, list) else ()
 
 
 def _plain_yaml(text: str) -> str:

@@ -15,8 +15,6 @@ from semidense.datasets.formats import files
 
 Matrix: TypeAlias = NDArray[np.float64]
 _LARGEST_FILE = 1 << 18
-_NESTED = 100
-"""Lists around the numbers of a matrix; more are no matrix."""
 _Value = TypeVar("_Value")
 
 
@@ -129,7 +127,7 @@ def matrix(path: Path, name: str, data: object, shape: tuple[int, int]) -> Matri
     Raises:
         CalibrationError: If they are too few or too many, or not finite numbers.
     """
-    values = flat(data, math.prod(shape))
+    values = floats(data)
     if values.size != math.prod(shape) or not np.isfinite(values).all():
         raise CalibrationError(f"{path}: {name} is no matrix of {shape[0]} x {shape[1]} numbers")
     return values.reshape(shape)
@@ -143,20 +141,10 @@ def sides(path: Path, name: str, values: Matrix) -> tuple[int, int]:
     return int(first), int(second)
 
 
-def flat(data: object, most: int) -> Matrix:
-    """Return numbers of any nesting, flat; nothing if one of them is no number, as ``true`` is none.
-
-    A list may hold itself many times over, as YAML's aliases let it: what has more than ``most`` numbers is not walked
-    to its end.
-    """
-    found, waiting, seen = list[object](), [data], 0
-    while waiting and len(found) <= most and seen <= _NESTED + 2 * most:
-        cell, seen = waiting.pop(), seen + 1
-        if isinstance(cell, list | tuple | np.ndarray):
-            waiting += reversed(cell[: most + 1])
-        else:
-            found.append(cell)
+def floats(data: object) -> Matrix:
+    """Return numbers of any nesting, flat; nothing if one of them is no number, as ``true`` is none."""
     try:
-        return np.empty(0) if waiting or any(isinstance(cell, bool) for cell in found) else np.array(found, np.float64)
+        cells = np.array(data, object).ravel()
+        return np.empty(0) if any(isinstance(cell, bool) for cell in cells) else cells.astype(np.float64)
     except (TypeError, ValueError, OverflowError):
         return np.empty(0)

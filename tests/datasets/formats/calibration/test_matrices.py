@@ -186,13 +186,19 @@ def test_a_size_that_no_image_has_is_refused(tmp_path: Path, size: list[float]) 
         read_cameras([saved(tmp_path, SIMPLE | {"unit": "m", "width": size[0], "height": size[1]})])
 
 
-def test_lists_that_hold_each_other_are_not_walked_to_their_end(tmp_path: Path) -> None:
+@pytest.mark.parametrize("last", ["P1: *p\nP2: *p", "fx: 1\nunit: *p", "image_size: *p", "nothing: 1"])
+def test_lists_that_hold_each_other_are_not_walked_to_their_end(tmp_path: Path, last: str) -> None:
     names = "abcdefghijklmnop"
     lines = [f"a: &a [{', '.join(['1'] * 9)}]"]
     lines += [f"{new}: &{new} [{', '.join(['*' + old] * 9)}]" for old, new in itertools.pairwise(names)]
-    (tmp_path / "c.yml").write_text("%YAML:1.0\n---\n" + "\n".join([*lines, "P1: *p", "P2: *p"]))
-    with pytest.raises(CalibrationError, match="P1 is no matrix of 3 x 4 numbers"):
+    (tmp_path / "c.yml").write_text("%YAML:1.0\n---\n" + "\n".join([*lines, last]))
+    with pytest.raises(CalibrationError, match="aliases stand for more than 262,144 values"):
         read_cameras([tmp_path / "c.yml"], "m")
+
+
+def test_an_alias_is_read_as_what_it_stands_for(tmp_path: Path) -> None:
+    (tmp_path / "c.yml").write_text(f"%YAML:1.0\n---\nP1: &left {P1}\nP2: {P2}\nagain: *left\n")
+    assert read_cameras([tmp_path / "c.yml"], "mm").calibration.baseline == pytest.approx(0.12)
 
 
 @pytest.mark.parametrize(
