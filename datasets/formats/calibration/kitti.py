@@ -90,7 +90,7 @@ def _size(path: Path, lines: Mapping[str, list[str]], left: str) -> tuple[int, i
     """Return rows and columns: ``S_rect`` holds columns and rows, ``roi`` the first and last column and row."""
     if left == "P1_roi" and "roi" in lines:
         first_x, last_x, first_y, last_y = _whole(matrix(path, "roi", lines["roi"], (1, 4)))
-        return last_y - first_y + 1, last_x - first_x + 1
+        return sides(path, "roi", np.array([last_y - first_y + 1, last_x - first_x + 1], np.float64))
     name = left.replace("P_rect", "S_rect")
     if name == left or name not in lines:
         return None

@@ -97,3 +97,16 @@ def test_the_street_of_karlsruhe(stereo_data: Path) -> None:
     assert (known.focal, known.doffs, known.centre) == (645.2401, 0, (635.9587, 194.1291))
     assert known.baseline == pytest.approx(1000 * 368.2632 / 645.2401)
     assert (scene.size, scene.warnings) == ((372, 1344), ())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        RAW.replace("1.242000e+03 3.750000e+02", "0 0"),
+        f"roi: 5 4 0 9\nP1_roi: {P[0]}\nP2_roi: {P[1]}\n",
+    ],
+    ids=["S_rect", "roi"],
+)
+def test_images_without_a_pixel_are_refused(tmp_path: Path, text: str) -> None:
+    with pytest.raises(CalibrationError, match="expected whole numbers of pixels"):
+        read(tmp_path, text, "image_2")
