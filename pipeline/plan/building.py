@@ -235,11 +235,6 @@ class _Builder:
     def _settings(self) -> dict[str, Any]:
         return self.config.to_dict()
 
-    def _configuration(self, product: str, argument: object) -> dict[str, Any]:
-        """Return all settings, a step's own as they were resolved for it."""
-        own = {product: argument.model_dump(mode="json")} if isinstance(argument, Params) else {}
-        return {**self._settings, **(own if product in self._settings else {})}
-
     def _add(
         self,
         stage: Stage,
@@ -267,7 +262,7 @@ class _Builder:
                 code=code_of(stage.module, *modules),
                 environment=environment(stage),
                 R=semidense.R if filtered else None,
-                configuration=self._configuration(stage.product, argument),
+                configuration=self._settings,
             )
         return step_id
 

@@ -26,8 +26,6 @@ Settings = Mapping[str, object] | Iterable[str] | str
 """Settings as people type them: ``{"semidense.R": 0.8}``, ``"semidense.R=0.8"`` or several of the latter."""
 _VALUE = re.compile(r'(?:\[[^\]]*\]|"[^"]*"|[^,])+')
 """One of several values."""
-_FILLED_IN = {"d_min", "d_max", "fold_of_scene"}
-"""Settings that a run finds for each scene, unless they are set."""
 CHOICES = ("weights", "use")
 """Sections with a field a product, each empty by default."""
 
@@ -89,9 +87,9 @@ class Config(BaseModel):
         return found
 
     def to_dict(self) -> dict[str, dict[str, Any]]:
-        """Return all settings by section, as plain JSON types; of ``CHOICES`` those that were made."""
+        """Return all settings by section, as plain JSON types; of ``CHOICES`` those that were made or undone."""
         return {
-            name: getattr(self, name).model_dump(mode="json", exclude_none=name in CHOICES)
+            name: getattr(self, name).model_dump(mode="json", exclude_unset=name in CHOICES)
             for name in type(self).model_fields
         }
 
@@ -148,25 +146,14 @@ def _read_file(file: Path) -> dict[str, Any]:
 
 
 def _read_exported(file: Path, text: str) -> dict[str, Any]:
-    """Return the settings of a ``config.json`` or ``summary.json``, without ranges: each scene has its own."""
+    """Return the settings of a ``config.json`` or ``summary.json``, as they were asked for."""
     try:
-        found = [_set_by_users(each["sections"]) for each in json.loads(text)["configuration"]]
+        found = [dict(each["sections"]) for each in json.loads(text)["configuration"]]
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
         raise UsageError(f"configuration {file}: it is no config.json or summary.json of this version") from None
     if not found or any(each != found[0] for each in found):
         raise UsageError(f"configuration {file}: it holds {len(found)} sets of settings that differ; give a TOML file")
     return found[0]
-
-
-def _set_by_users(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Return those of the settings in a file that a configuration has and that no run fills in by itself."""
-    known = _model(tuple(STAGES)).model_fields
-    taken = {name: getattr(known[name].annotation, "model_fields", {}).keys() - _FILLED_IN for name in known}
-    return {
-        name: {field: value for field, value in fields.items() if field in taken[name]}
-        for name, fields in settings.items()
-        if name in known
-    }
 
 
 def _read_toml(file: Path, text: str) -> dict[str, Any]:

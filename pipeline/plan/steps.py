@@ -55,7 +55,7 @@ class Step:
         code: hash of every module that decides the result.
         environment: what else changes its bits.
         R: the confidence threshold that a product below ``semidense`` was made with.
-        configuration: all settings of the first variant that needs it, with its own as they were resolved.
+        configuration: all settings of the first variant that needs it, as they were asked for.
     """
 
     id: str

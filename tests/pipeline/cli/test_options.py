@@ -39,16 +39,17 @@ def exported(tmp_path: Path, *settings: dict[str, dict[str, object]]) -> Path:
     return path
 
 
-def test_an_exported_configuration_is_taken_without_what_its_scenes_brought(tmp_path: Path) -> None:
-    made = {
-        "images": {"files.left": "ab"},
-        "costvolume": {"d_min": 0, "d_max": 70, "mode": "guided", "votes": 12},
-        "matching_net": {"shipped": "cd"},
-        "semidense": {"R": 0.0},
-    }
-    config = Config.load(exported(tmp_path, made, made | {"costvolume": made["costvolume"] | {"d_max": 9}}))
-    costs = config.section("costvolume")
-    assert (costs.mode, costs.votes, costs.d_max, config.section("semidense").R) == ("guided", 12, None, 0)
+def test_an_exported_configuration_is_taken_as_it_was_asked_for(tmp_path: Path) -> None:
+    asked = ["costvolume.d_max=70", "costvolume.mode=guided", "semidense.R=0", "use.confidence=null"]
+    config = Config.load(None, asked, "robust")
+    again = Config.load(exported(tmp_path, config.to_dict()), preset="robust")
+    assert again == config
+    assert (again.section("costvolume").d_max, again.choice("use", "confidence")) == (70, None)
+
+
+def test_a_name_that_an_exported_configuration_must_not_have_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"semidense has no setting 'RR'"):
+        Config.load(exported(tmp_path, {"semidense": {"RR": 0.5}}))
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"configuration": [3]}', '{"configuration": []}'])
