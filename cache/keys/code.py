@@ -14,6 +14,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from importlib.machinery import ModuleSpec
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
 
@@ -67,9 +68,12 @@ def code_parts(module: str, packages: tuple[str, ...]) -> dict[str, str]:
 
     Raises:
         SourceNotFound: if ``module`` has no Python source, or a file cannot be read or parsed.
-        EditedSource: if the file of a module that was imported changed since this process began.
+        EditedSource: if the file of a module that was imported changed since this process began, or a module was
+            reloaded.
     """
-    return dict(_parts(module, packages))
+    parts = _parts(module, packages)
+    require_imported_as_hashed(parts)
+    return dict(parts)
 
 
 @cache
@@ -106,23 +110,26 @@ def module_hash(module: str) -> str | None:
 
 
 def require_imported_as_hashed(modules: Iterable[str]) -> None:
-    """Refuse a module that was hashed first, edited then, and imported after that: it runs under another text's key.
+    """Refuse a module that runs under another text's key: hashed, edited and then imported, or reloaded.
 
     Args:
-        modules: names; those that were never imported, or were when they were hashed, need no look.
+        modules: names; those that were never imported need no look.
 
     Raises:
         EditedSource: naming the file.
     """
     for name in modules:
-        if name in _settled or name not in sys.modules:
+        if name not in sys.modules:
+            continue
+        spec = getattr(sys.modules[name], "__spec__", None)
+        if name in _settled and _settled[name] is spec:
             continue
         located = _locate(name)
         if located and located.file:
-            known = _read(located)
-            if stamp_of(located.file) != known.stamp and source_hash(located.file.read_bytes()) != known.hash:
+            known, changed = _read(located), stamp_of(located.file) != _read(located).stamp
+            if changed and (name in _settled or source_hash(located.file.read_bytes()) != known.hash):
                 raise EditedSource(_edited(located.file))
-        _settled.add(name)
+        _settled[name] = spec
 
 
 def _parents(module: str) -> Iterator[str]:
@@ -163,8 +170,10 @@ def _locate_by_import_system(name: str) -> _Module | None:
     return _Module(name, file, folders) if file or folders else None
 
 
-_settled: set[str] = set()
-"""Modules that are known to run the text that was hashed; what happens to their files does not matter any more."""
+_settled: dict[str, ModuleSpec | None] = {}
+"""Modules that are known to run the text that was hashed, as they were imported: a later import makes another spec.
+
+What happens to their files does not matter any more, until one is imported again."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +199,7 @@ def _read(module: _Module) -> _Source:
     if is_imported:
         if file.stat().st_ctime > process_start():
             raise EditedSource(_edited(file))
-        _settled.add(module.name)
+        _settled[module.name] = getattr(sys.modules[module.name], "__spec__", None)
     return _Source(hashed, imports, data.decode("utf-8", "replace"), stamp)
 
 

@@ -236,7 +236,7 @@ def test_refuses(tree: Tree, files: dict[str, str], module: str) -> None:
 
 
 EDITING = """
-import sys, time
+import importlib, sys, time
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 module = Path(sys.argv[1]) / "edited" / "stage.py"
@@ -256,6 +256,8 @@ def look():
 for act in sys.argv[2].split():
     if act == "import":
         import edited.stage
+    elif act == "reload":
+        importlib.reload(edited.stage)
     else:
         try:
             {"edit": edit, "hash": hashes, "look": look}[act]()
@@ -276,6 +278,8 @@ print("end")
         pytest.param("import hash edit hash look", 0, id="what runs is what was hashed"),
         pytest.param("hash import look edit look", 0, id="known to be the same by then"),
         pytest.param("hash edit look", 0, id="never imported"),
+        pytest.param("import hash edit reload look hash", 2, id="reloaded, new code would run under the old key"),
+        pytest.param("import hash look reload look hash", 0, id="reloaded as it was"),
     ],
 )
 def test_what_runs_is_what_was_hashed(tmp_path: Path, acts: str, refused: int) -> None:
