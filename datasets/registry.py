@@ -176,8 +176,20 @@ def open_dataset(spec: str) -> Dataset:
         near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.4)
         hint = f"did you mean {known[near[0]].pattern}?" if near else f"known are {', '.join(_patterns())}"
         raise UnknownDatasetError(f"no data set {name!r}; {hint}")
-    lister = cast(_Lister, import_module(known[name].module))
-    return Dataset(spec, lister.list_scenes(argument))
+    return Dataset(spec, _listed(spec, known[name].module, argument))
+
+
+def _listed(spec: str, module: str, argument: str) -> tuple[SceneSource, ...]:
+    """Return the scenes that a kind's module lists; whatever fails in one from outside is told in one line."""
+    try:
+        scenes = tuple(cast(_Lister, import_module(module)).list_scenes(argument))
+    except DatasetError:
+        raise
+    except Exception as error:
+        raise DatasetError(f"data set {spec}: {module} failed: {type(error).__name__}: {error}") from error
+    if odd := [scene for scene in scenes if not isinstance(scene, SceneSource)]:
+        raise DatasetError(f"data set {spec}: {module} listed {odd[0]!r}; a scene is a SceneSource")
+    return scenes
 
 
 def _joined(spec: str, parts: list[Dataset]) -> Dataset:

@@ -140,8 +140,19 @@ class Silent:
 
 
 @dataclass(frozen=True)
+class Always:
+    """A function of a declaration that always returns the same; unlike a lambda it can be pickled."""
+
+    value: Any
+
+    def __call__(self, *_: object) -> Any:  # noqa: ANN401 - of the type of what it was given
+        """Return the value, whatever is asked."""
+        return self.value
+
+
+@dataclass(frozen=True)
 class Stage:
-    """The declaration of a stage.
+    """The declaration of a stage. It can be pickled, if its functions have names.
 
     Attributes:
         product: what it makes; the name that ``--upto`` takes.
@@ -178,10 +189,10 @@ class Stage:
     params: type[Params] = NoParams
     scope: Scope = "scene"
     tile_rows: int | None = None
-    chunks_a_tile: Callable[[Any, int], int] = lambda _params, _width: 1
-    halo: Callable[[Any], int] = lambda _: 0
+    chunks_a_tile: Callable[[Any, int], int] = Always(1)
+    halo: Callable[[Any], int] = Always(0)
     border: Border = "cut"
-    sizes: Callable[[Any], Mapping[str, int]] = lambda _: {}
+    sizes: Callable[[Any], Mapping[str, int]] = Always({})
     monitored: bool = False
     section: str = ""
     lazy: tuple[str, ...] = ()
@@ -194,6 +205,16 @@ class Stage:
     def module(self) -> str:
         """Name of the module whose code, with all it imports, makes the product."""
         return self.compute.partition(":")[0]
+
+    @property
+    def foreign_identity(self) -> dict[str, Any]:
+        """What else the key of a stage of another package holds: its function, since a module may have several; arrays.
+
+        A module of ours has one function a stage, and its arrays change with its code.
+        """
+        if self.module.partition(".")[0] == __name__.partition(".")[0]:
+            return {}
+        return {"compute": self.compute, "outputs": [[each.name, each.dims, each.dtype] for each in self.outputs]}
 
     def tiling(self, params: Params) -> str:
         """Say how the image is cut: it decides the order of sums, and which files there are."""

@@ -183,4 +183,4 @@ def explained_at(place: str) -> Iterator[None]:
     except Exception as error:
         if line := told_of_stage(error):
             raise StageRefused(f"{place}: {line}") from error
-        raise StageFailed(f"{place}: {error}" if str(error) else f"{place}: {type(error).__name__}") from error
+        raise StageFailed(f"{place}: {type(error).__name__}{f': {error}' if str(error) else ''}") from error

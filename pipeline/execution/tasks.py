@@ -21,6 +21,7 @@ from semidense.cache import (
 )
 from semidense.pipeline.execution.checkpoints import Checkpoints
 from semidense.pipeline.execution.jobs import Context, Job, Span, Unread, explained, flat
+from semidense.pipeline.execution.returned import require_declared, require_lengths
 from semidense.pipeline.execution.tiles import Labelled, Rows, read_block, trim
 from semidense.pipeline.plan.environment import cpu_name, version
 from semidense.pipeline.plan.errors import StageFailed
@@ -96,6 +97,7 @@ def make_tile(context: Context, job: Job, rows: Rows) -> Span | None:
             return None
         opened = {product: context.recent.open(context.store, keys[0]) for product, keys in job.inputs.items()}
         made = compute_tile(step, opened, rows)
+        require_lengths(step.stage, made, step.lengths | {"y": rows.stop - rows.start})
         for output in step.stage.outputs:
             _write_tile(job.draft, output, made[output.name], rows)
     context.watch.advanced(step, 1, step.tiles, "")
@@ -117,7 +119,7 @@ def call(step: Step, *arguments: object) -> Arrays:
     require_imported_as_hashed(step.code)
     made = function(step.argument, *arguments)
     require_imported_as_hashed(step.code)  # it may have imported more
-    return made
+    return require_declared(step.stage, made)
 
 
 def _holds_tile(draft: Draft, outputs: Iterable[Output], rows: Rows) -> bool:
@@ -129,8 +131,7 @@ def create_arrays(job: Job) -> Job:
     """Create the arrays of a tiled product, whose sizes are known beforehand."""
     if job.draft is None or job.step.size is None:
         return job
-    stage, params = job.step.stage, job.step.params
-    sizes = {"y": job.step.size[0], "x": job.step.size[1], **stage.sizes(params)}
+    stage, sizes = job.step.stage, job.step.lengths
     with explained(job.step):
         if job.draft.published():
             return job
@@ -151,6 +152,7 @@ def make_whole(context: Context, job: Job) -> Span | None:
             return None
         inputs = {product: read_whole(context, step, product, keys) for product, keys in job.inputs.items()}
         made = call(step, inputs, *_monitor(context, job.draft, step))
+        require_lengths(step.stage, made, step.lengths)
         for output in step.stage.outputs:
             array = made[output.name].astype(output.dtype or made[output.name].dtype, copy=False)
             _create(job.draft, output, array.shape, str(array.dtype), None)

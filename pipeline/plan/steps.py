@@ -110,12 +110,16 @@ class Step:
         return -(-self.size[0] // self.tile_rows)
 
     @property
+    def lengths(self) -> dict[str, int]:
+        """How long the dimensions of its arrays are, as far as that is known before it is made."""
+        image = {"y": self.size[0], "x": self.size[1]} if self.size else {}
+        return {**image, **self.stage.sizes(self.params)}
+
+    @property
     def declared_bytes(self) -> int | None:
         """Bytes of its arrays before compression; None where a length or a type is known only once it is made."""
-        if self.size is None:
-            return None
-        sizes = {"y": self.size[0], "x": self.size[1], **self.stage.sizes(self.params)}
-        if any(each.dtype is None or not {*each.dims} <= {*sizes} for each in self.stage.outputs):
+        sizes = self.lengths
+        if self.size is None or any(each.dtype is None or not {*each.dims} <= {*sizes} for each in self.stage.outputs):
             return None
         return sum(prod(sizes[dim] for dim in each.dims) * np.dtype(each.dtype).itemsize for each in self.stage.outputs)
 

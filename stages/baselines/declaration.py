@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from semidense.stages.learning.schedule import SHARDS, Schedule
-from semidense.stages.stage import Output, Params, Stage, StageError
+from semidense.stages.stage import Always, Output, Params, Stage, StageError
 
 _DENSE = Output("dense", ("y", "x"), "float32", "px", "disparity of every pixel, before anything is filtered")
 _CHECKED = Output("disparity", ("y", "x"), "float32", "px", "disparity after the matcher's own checks; NaN: dropped")
@@ -106,6 +106,14 @@ NCC_WINDOW = 3
 """Side of the inner window of SNCC, as published."""
 
 
+def _census_halo(params: WindowParams) -> int:
+    return CENSUS_WINDOW[0] // 2 + params.window // 2
+
+
+def _ncc_halo(params: WindowParams) -> int:
+    return NCC_WINDOW // 2 + params.window // 2
+
+
 class Matched(TypedDict):
     """The product of a matcher: (y, x) disparities in px, NaN: none. ``disparity`` passed the matcher's own checks."""
 
@@ -130,7 +138,7 @@ CENSUS = Stage(
     compute="semidense.stages.baselines.census:compute_census",
     params=WindowParams,
     tile_rows=64,
-    halo=lambda params: CENSUS_WINDOW[0] // 2 + params.window // 2,
+    halo=_census_halo,
 )
 """Census transform, Hamming distance, mean over a window, winner takes all."""
 
@@ -141,9 +149,13 @@ SNCC = Stage(
     compute="semidense.stages.baselines.sncc:compute_sncc",
     params=WindowParams,
     tile_rows=64,
-    halo=lambda params: NCC_WINDOW // 2 + params.window // 2,
+    halo=_ncc_halo,
 )
 """Summed normalised cross-correlation, winner takes all."""
+
+
+def _window_halo(params: CostConfidenceParams) -> int:
+    return params.window // 2
 
 
 class CostMeasures(TypedDict):
@@ -167,7 +179,7 @@ COST_CONFIDENCE = Stage(
     compute="semidense.stages.baselines.cost_confidence:compute_cost_confidence",
     params=CostConfidenceParams,
     tile_rows=32,
-    halo=lambda params: params.window // 2,
+    halo=_window_halo,
 )
 """Four confidence measures of the raw disparity, from its cost volume alone; higher is surer, NaN: none."""
 
@@ -226,7 +238,7 @@ MC_CNN_ACCURATE = Stage(
     compute="semidense.stages.baselines.mc_cnn:compute_mc_cnn_accurate",
     params=CheckedParams,
     tile_rows=32,
-    halo=lambda _: MC_CNN_RADIUS,
+    halo=Always(MC_CNN_RADIUS),
     needs=("mccnn",),
 )
 """MC-CNN accurate with its Middlebury weights, winner takes all; as slow as an exact cost volume."""
@@ -266,7 +278,7 @@ O1 = Stage(
     outputs=(_CONFIDENCE,),
     compute="semidense.stages.baselines.o1:compute_o1",
     tile_rows=128,
-    halo=lambda _: O1_SIDES[-1] // 2,
+    halo=Always(O1_SIDES[-1] // 2),
 )
 
 CCNN_NET = Stage(
@@ -288,7 +300,7 @@ CCNN = Stage(
     outputs=(_CONFIDENCE,),
     compute="semidense.stages.baselines.ccnn:compute_ccnn",
     tile_rows=128,
-    halo=lambda _: CCNN_RADIUS,
+    halo=Always(CCNN_RADIUS),
     border="edge",
 )
 

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator
 from semidense.stages.compute.precision import Precision
 from semidense.stages.evaluation.silence.declaration import Vetoing
 from semidense.stages.learning.schedule import SHARDS, Schedule
-from semidense.stages.stage import DisparityMap, Images, Network, Output, Params, Stage, Truth
+from semidense.stages.stage import Always, DisparityMap, Images, Network, Output, Params, Stage, Truth
 from semidense.stages.transforms.window import require_window
 
 PATCH = 101
@@ -181,7 +181,7 @@ CONFIDENCE = Stage(
     compute="semidense.stages.evaluation.confidence:compute_confidence",
     params=ConfidenceParams,
     tile_rows=256,
-    halo=lambda _: RADIUS,
+    halo=Always(RADIUS),
     border="edge",
     one_view=True,
 )

@@ -1,6 +1,7 @@
 """What the products up to the cost volume are made from, and what can be set. Light: it does not load torch."""
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Any, ClassVar, Literal, NotRequired, TypedDict
 
 import numpy as np
@@ -230,6 +231,10 @@ def _chunks_a_tile(params: CostVolumeParams, width: int) -> int:
     return min(4, max(1, NUMBERS // (CHUNK * width * (len(params.disparities) + _BESIDE))))
 
 
+def _sizes(params: CostVolumeParams) -> dict[str, int]:
+    return {"d": len(params.disparities)}
+
+
 COST_VOLUME = Stage(
     product="costvolume",
     inputs=("channels", "matching_net", "descriptor_net"),
@@ -241,7 +246,7 @@ COST_VOLUME = Stage(
     params=CostVolumeParams,
     tile_rows=CHUNK,
     chunks_a_tile=_chunks_a_tile,
-    halo=lambda params: params.context,
+    halo=attrgetter("context"),
     border="edge",
-    sizes=lambda params: {"d": len(params.disparities)},
+    sizes=_sizes,
 )

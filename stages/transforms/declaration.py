@@ -1,5 +1,6 @@
 """What the channels are made from, and what can be set. Light: it does not load numba."""
 
+from operator import attrgetter
 from typing import Literal, NotRequired, TypedDict
 
 import numpy as np
@@ -94,6 +95,10 @@ class Channels(TypedDict):
     channels: NDArray[np.float32]
 
 
+def _sizes(params: ChannelsParams) -> dict[str, int]:
+    return {"view": 2, "channel": len(params.use)}
+
+
 CHANNELS = Stage(
     product="channels",
     inputs=("images", "alignment"),
@@ -109,8 +114,8 @@ CHANNELS = Stage(
     compute="semidense.stages.transforms.channels:compute_channels",
     params=ChannelsParams,
     tile_rows=128,
-    halo=lambda params: params.halo,
-    sizes=lambda params: {"view": 2, "channel": len(params.use)},
+    halo=attrgetter("halo"),
+    sizes=_sizes,
 )
 """Channels of a scene. ``images`` has ``left`` and ``right`` (y, x, band) uint8 or uint16 and ``moments``
 (view, moment) float64: the gray moments of each whole view, so that a tile standardises as the whole image does.

@@ -1,7 +1,9 @@
+import sys
 from pathlib import Path
 
 import pytest
 
+from semidense.datasets import registry
 from semidense.datasets.errors import DatasetError, SceneNotFound, UnknownDatasetError
 from semidense.datasets.registry import Dataset, describe, open_dataset
 from semidense.datasets.scene import DisparityRange, SceneSource
@@ -33,6 +35,28 @@ def test_an_unknown_name_brings_the_nearest(spec: str, hint: str) -> None:
         open_dataset(spec)
     assert hint in str(caught.value)
     assert isinstance(caught.value, LookupError)
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        pytest.param("", "AttributeError: ", id="it lists nothing"),
+        pytest.param("import nowhere_to_be_found", "ModuleNotFoundError: ", id="it cannot be imported"),
+        pytest.param("def list_scenes(argument): return int(argument)", "ValueError: invalid literal", id="it fails"),
+        pytest.param("def list_scenes(argument): return None", "TypeError: ", id="it gives no scenes"),
+        pytest.param("def list_scenes(argument): return [3]", "listed 3; a scene is a SceneSource", id="no scene"),
+    ],
+)
+def test_a_kind_of_another_package_that_fails_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, message: str
+) -> None:
+    (tmp_path / "rig_of_a_test.py").write_text(code)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "rig_of_a_test", raising=False)
+    monkeypatch.setattr(registry, "_registered", {})
+    registry.register_dataset(registry.Kind("rig:N", "a rig", "rig_of_a_test"))
+    with pytest.raises(DatasetError, match=f"^data set rig:abc: rig_of_a_test .*{message}"):
+        open_dataset("rig:abc")
 
 
 @pytest.mark.parametrize("name", ["middlebury", "kitti2015", "eth3d"])

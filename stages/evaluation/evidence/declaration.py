@@ -10,7 +10,7 @@ from pydantic import Field
 from semidense.stages.compute.precision import Precision
 from semidense.stages.evaluation.declaration import RADIUS, Judged
 from semidense.stages.learning.schedule import SHARDS, Schedule
-from semidense.stages.stage import DisparityMap, Images, Network, Output, Params, Stage, Truth
+from semidense.stages.stage import Always, DisparityMap, Images, Network, Output, Params, Stage, Truth
 
 AGREEMENTS = (5, 9, 25)
 """Sides of the windows in which neighbours that agree are counted, px."""
@@ -168,7 +168,7 @@ EVIDENCE_CONFIDENCE = Stage(
     compute="semidense.stages.evaluation.evidence.confidence:compute_evidence_confidence",
     params=EvidenceConfidenceParams,
     tile_rows=256,
-    halo=lambda _: RADIUS + REACH,
+    halo=Always(RADIUS + REACH),
     border="edge",
 )
 """``use.confidence=evidence_confidence`` puts it in the place of ``confidence``."""

@@ -1,5 +1,6 @@
 """Declare the two products that can veto a confidence. Light: it loads no numba."""
 
+from operator import attrgetter
 from typing import TypedDict
 
 import numpy as np
@@ -33,6 +34,11 @@ class DistinctivenessParams(Params):
     @classmethod
     def _odd(cls, window: int) -> int:
         return require_window(window)
+
+    @property
+    def halo(self) -> int:
+        """Pixels of context that a tile needs on each side."""
+        return self.window - 1 + self.margin
 
     @property
     def reach(self) -> int:
@@ -79,7 +85,7 @@ DISTINCTIVENESS = Stage(
     compute="semidense.stages.evaluation.silence.distinctiveness:compute_distinctiveness",
     params=DistinctivenessParams,
     tile_rows=256,
-    halo=lambda params: params.window - 1 + params.margin,
+    halo=attrgetter("halo"),
 )
 """Where the views themselves cannot tell a disparity, whatever matches them."""
 

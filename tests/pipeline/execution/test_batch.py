@@ -64,7 +64,7 @@ def test_a_scene_that_fails_is_named_and_what_was_made_is_kept(
 ) -> None:
     broken = replace(BLURRED, compute="tests.pipeline.toy:fail_below")
     steps = [each for number in range(COUNT) for each in (scene(number, broken) if number == 5 else scene(number))]
-    with pytest.raises(StageFailed, match=r"^blurred of Toy 5, rows 0-3: the fourth row broke it$"):
+    with pytest.raises(StageFailed, match=r"^blurred of Toy 5, rows 0-3: RuntimeError: the fourth row broke it$"):
         execute(toy_plan(graph(*steps)), store, Unwatched(), {}, workers=1)
     assert drafts() == []
     kept = {(entry.label["scene"], entry.label["product"]) for entry in store.entries()}

@@ -162,8 +162,8 @@ def test_a_failing_tile_is_named_with_its_cause(toy_run: ToyRun, toy_plan: ToyPl
     with pytest.raises(StageFailed) as caught:
         toy_run(failing("fail_below"))
     assert str(caught.value) in (
-        "blurred of Toy, rows 4-7: the fourth row broke it",
-        "blurred of Toy, rows 8-9: the fourth row broke it",
+        "blurred of Toy, rows 4-7: RuntimeError: the fourth row broke it",
+        "blurred of Toy, rows 8-9: RuntimeError: the fourth row broke it",
     )
     assert isinstance(caught.value.__cause__, RuntimeError)
     assert drafts() == [], "nothing half-made is left"

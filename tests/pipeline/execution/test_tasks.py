@@ -126,7 +126,7 @@ def test_a_monitored_stage_reports_and_its_checkpoint_is_gone_at_the_end(context
 @pytest.mark.parametrize(
     ("error", "kind", "text"),
     [
-        pytest.param(RuntimeError("bang"), StageFailed, "ramp of Toy, rows 0-3: bang", id="a fault"),
+        pytest.param(RuntimeError("bang"), StageFailed, "ramp of Toy, rows 0-3: RuntimeError: bang", id="a fault"),
         pytest.param(KeyError(), StageFailed, "ramp of Toy, rows 0-3: KeyError", id="a fault without words"),
         pytest.param(DatasetError("bad file"), StageRefused, "ramp of Toy, rows 0-3: bad file", id="bad data"),
         pytest.param(UsageError("no"), StageRefused, "ramp of Toy, rows 0-3: no", id="a wrong request"),

@@ -1,6 +1,7 @@
 """A user's own pair through ``pipeline.match``, with the shipped weights on a few pixels."""
 
 import json
+import pickle
 import shutil
 import subprocess
 import sys
@@ -79,6 +80,11 @@ def test_depth_and_points_follow_the_calibration(found: Match) -> None:
     rows, columns = np.nonzero(known)
     assert np.allclose(points[:, 0] / -points[:, 2] * 100 + 30, columns, atol=1e-3)
     assert np.allclose(-points[:, 1] / -points[:, 2] * 100 + 20, rows, atol=1e-3)
+
+
+def test_it_can_be_pickled(found: Match) -> None:
+    again = pickle.loads(pickle.dumps(found))
+    assert np.array_equal(again.disparity, found.disparity, equal_nan=True)
 
 
 def test_a_second_call_makes_nothing(folder: Path, found: Match) -> None:

@@ -16,8 +16,8 @@ from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.presets import PRESETS
 from semidense.pipeline.plan.steps import SPLIT, Graph, Request, Step, products
 from semidense.pipeline.plan.training_split import training_scenes
-from semidense.stages.catalog import CATALOG, READ
-from semidense.stages.stage import StageError
+from semidense.stages.catalog import CATALOG, READ, STAGES
+from semidense.stages.stage import Output, Stage, StageError
 from tests.tiny import PATH, SPEC, TEST_ONLY
 
 DATASET = open_dataset("synthetic:train=2,test=2,height=64,width=80,disparities=8")
@@ -51,6 +51,22 @@ def test_without_training_every_scene_is_worked_on_with_the_shipped_weights() ->
     made = graph()
     assert counts(made) == Counter(dict.fromkeys(PATH - TRAINING, 4)) - Counter(dict.fromkeys(SHIPPED, 3))
     assert len(made.targets) == 4
+
+
+def test_two_stages_of_one_module_of_another_package_are_two_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    def key(compute: str, dtype: str) -> str:
+        outputs = (Output("disparity", ("y", "x"), dtype, "px", "disparity"),)
+        monkeypatch.setitem(STAGES, "theirs", Stage("theirs", ("images",), outputs, compute))
+        made = find(graph(upto="theirs"), "theirs")
+        return made.recipe({each: "0" * 64 for ids in made.inputs.values() for each in ids}).key
+
+    module = "tests.pipeline.toy"
+    keys = [
+        key(f"{module}:make_sum", "float32"),
+        key(f"{module}:refuse", "float32"),
+        key(f"{module}:refuse", "float64"),
+    ]
+    assert len({*keys}) == 3
 
 
 def test_figures_of_scenes_that_the_weights_may_know_are_told_to_be_no_test() -> None:

@@ -11,7 +11,7 @@ from semidense.stages.compute.precision import Precision
 from semidense.stages.evaluation.declaration import RADIUS
 from semidense.stages.evaluation.evidence.declaration import MEANS, OF_MAP, REACH
 from semidense.stages.learning.schedule import SHARDS, Schedule
-from semidense.stages.stage import DisparityMap, Images, Network, Output, Params, Stage, Truth
+from semidense.stages.stage import Always, DisparityMap, Images, Network, Output, Params, Stage, Truth
 from semidense.stages.transforms.declaration import Channels
 
 MATCHERS = ("sgm", "sncc", "census", "mc_cnn")
@@ -174,7 +174,7 @@ FOREIGN_CONFIDENCE = Stage(
     compute="semidense.stages.evaluation.evidence.foreign.confidence:compute_foreign_confidence",
     params=ForeignConfidenceParams,
     tile_rows=256,
-    halo=lambda _: RADIUS + REACH,
+    halo=Always(RADIUS + REACH),
     border="edge",
     one_view=True,
 )
