@@ -32,7 +32,7 @@ from torch.nn import functional
 
 from semidense.stages.compute.kernel import kernel
 from semidense.stages.evaluation.declaration import PATCH, STRIDE
-from semidense.stages.learning.parameters import from_vector
+from semidense.stages.learning.parameters import from_vector, unset
 
 DISPARITY_UNIT = 5.0
 """Disparities, in px, are divided by this: one scale for all scenes, on which an error of 1 px still shows."""
@@ -115,7 +115,7 @@ def evaluation_net_from_parameters(parameters: NDArray[np.float32]) -> Evaluatio
 
 @lru_cache(maxsize=2)
 def _built(parameters: bytes) -> EvaluationNet:
-    net = EvaluationNet()
+    net = unset(EvaluationNet)
     from_vector(net, np.frombuffer(parameters, np.float32))
     return net.to(memory_format=torch.channels_last)  # type: ignore[call-overload, no-any-return]
 

@@ -1,6 +1,7 @@
 """A network's parameters as one flat vector: how they are cached, and how they come back."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import TypeVar
 
 import numpy as np
 import torch
@@ -8,6 +9,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from semidense.stages.stage import StageError
+
+N = TypeVar("N", bound=nn.Module)
 
 
 def initialise(net: nn.Module, seed: int) -> None:
@@ -24,6 +27,13 @@ def initialise(net: nn.Module, seed: int) -> None:
                 nn.init.zeros_(module.bias)
     with torch.no_grad():
         net.get_parameter("out.weight").mul_(0.1)
+
+
+def unset(build: Callable[[], N]) -> N:
+    """Return a network whose parameters are yet to be set: none is drawn, so torch's global generator is left alone."""
+    with torch.device("meta"):
+        net = build()
+    return net.to_empty(device="cpu")
 
 
 def count(net: nn.Module) -> int:

@@ -18,7 +18,7 @@ The same class trains and infers, on patches and on whole images, because of thr
 3. A fully connected layer on a 5 x 5 map is a 5 x 5 convolution.
 """
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Literal
 
 import numpy as np
@@ -28,7 +28,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from semidense.stages.compute.precision import autocast
-from semidense.stages.learning.parameters import count, from_vector
+from semidense.stages.learning.parameters import count, from_vector, unset
 from semidense.stages.matching.declaration import Head
 from semidense.stages.stage import StageError
 
@@ -164,10 +164,8 @@ def net_from_parameters(parameters: NDArray[np.float32], channels: int) -> Match
 def _built(parameters: bytes, channels: int) -> MatchingNet:
     vector = np.frombuffer(parameters, np.float32)
     for head in HEADS:
-        with torch.device("meta"):  # only to be counted: to draw its weights would take longer than a small tile
-            fits = count(MatchingNet(channels, head)) == vector.size
-        if fits:
-            net = MatchingNet(channels, head)
+        net = unset(partial(MatchingNet, channels, head))
+        if count(net) == vector.size:
             from_vector(net, vector)
             return net.to(memory_format=torch.channels_last)  # type: ignore[call-overload, no-any-return]
     raise StageError(

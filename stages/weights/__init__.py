@@ -7,6 +7,7 @@ No pickle is ever read. A file that is not exactly a network of this package is 
 
 import json
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from semidense.stages.evaluation.evidence.features import NAMES
 from semidense.stages.evaluation.evidence.foreign.declaration import FEATURES
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.net import EvaluationNet
-from semidense.stages.learning.parameters import count, from_vector, to_vector
+from semidense.stages.learning.parameters import count, from_vector, to_vector, unset
 from semidense.stages.matching.descriptors.net import descriptor_nets
 from semidense.stages.matching.net import HEADS, MatchingNet
 from semidense.stages.stage import Arrays, StageError
@@ -34,21 +35,21 @@ _CHANNELS = (3, 2, 1)
 
 
 def candidates(product: str) -> Iterator[nn.Module]:
-    """Yield every network that a product's parameters may belong to, the usual ones first.
+    """Yield every network that a product's parameters may belong to, yet to be set, the usual ones first.
 
     Raises:
         StageError: if the product is no network.
     """
     if product == "evaluation_net":
-        yield EvaluationNet()
+        yield unset(EvaluationNet)
     elif product == "matching_net":
-        yield from (MatchingNet(channels, head) for head in HEADS for channels in _CHANNELS)
+        yield from (unset(partial(MatchingNet, channels, head)) for head in HEADS for channels in _CHANNELS)
     elif product == "descriptor_net":
         yield from (net for channels in _CHANNELS for net in descriptor_nets(channels))
     elif product == "evidence_net":
-        yield EvidenceNet(len(NAMES))
+        yield unset(partial(EvidenceNet, len(NAMES)))
     elif product == "foreign_net":
-        yield EvidenceNet(len(FEATURES))
+        yield unset(partial(EvidenceNet, len(FEATURES)))
     else:
         raise StageError(
             f"{product} is no network: weights are those of matching_net, descriptor_net, evaluation_net, "

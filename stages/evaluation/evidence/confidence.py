@@ -1,6 +1,7 @@
 """The confidence of each pixel of a map by summed costs, weighed from all that is known of it."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,14 +16,14 @@ from semidense.stages.evaluation.evidence.features import features
 from semidense.stages.evaluation.evidence.net import EvidenceNet
 from semidense.stages.evaluation.evidence.of_map import AGREEMENT, NETWORK, opened
 from semidense.stages.evaluation.silence.veto import vetoed
-from semidense.stages.learning.parameters import from_vector
+from semidense.stages.learning.parameters import from_vector, unset
 from semidense.stages.stage import Images
 
 
 @one_thread()
 def weigh(parameters: NDArray[np.float32], known: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the log-odds (y, x) that each disparity is right, of features (feature, y + 2 REACH, x)."""
-    net = EvidenceNet(len(known))
+    net = unset(partial(EvidenceNet, len(known)))
     from_vector(net, parameters)
     with torch.inference_mode():
         odds: NDArray[np.float32] = net(torch.from_numpy(known)[None])[0].numpy()

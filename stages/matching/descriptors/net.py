@@ -11,7 +11,7 @@ Dilated kernels see the wider window for the price of the narrow one. It helps w
 """
 
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import get_args
 
 import numpy as np
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from semidense.stages.learning.parameters import count, from_vector
+from semidense.stages.learning.parameters import count, from_vector, unset
 from semidense.stages.matching.declaration import DILATIONS
 from semidense.stages.matching.descriptors.declaration import WIDTH, Width
 from semidense.stages.stage import StageError
@@ -71,7 +71,8 @@ class DescriptorNet(nn.Module):
 
 def descriptor_nets(channels: int) -> Iterator[DescriptorNet]:
     """Yield a network of each width, the usual one first; the number of parameters tells them apart."""
-    return (DescriptorNet(channels, width) for width in sorted(get_args(Width), key=lambda width: width != WIDTH))
+    widths = sorted(get_args(Width), key=lambda width: width != WIDTH)
+    return (unset(partial(DescriptorNet, channels, width)) for width in widths)
 
 
 def descriptor_net_from_parameters(parameters: NDArray[np.float32], channels: int) -> DescriptorNet:

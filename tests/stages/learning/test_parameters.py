@@ -4,7 +4,7 @@ import torch
 from torch import nn
 
 from semidense.stages.evaluation.net import EvaluationNet
-from semidense.stages.learning.parameters import count, from_vector, initialise, to_vector
+from semidense.stages.learning.parameters import count, from_vector, initialise, to_vector, unset
 from semidense.stages.matching.net import MatchingNet
 from semidense.stages.stage import StageError
 
@@ -37,6 +37,17 @@ def test_the_network_does_not_share_the_vectors_memory() -> None:
     from_vector(net, vector)
     vector[:] = 1
     assert not to_vector(net).any()
+
+
+def test_a_network_that_is_yet_to_be_set_draws_nothing_from_torchs_global_generator() -> None:
+    torch.manual_seed(0)
+    expected = torch.rand(1)
+    torch.manual_seed(0)
+    net = unset(EvaluationNet)
+    assert torch.rand(1) == expected
+    other = EvaluationNet()
+    from_vector(net, to_vector(other))
+    assert all(torch.equal(one, two) for one, two in zip(net.parameters(), other.parameters(), strict=True))
 
 
 @networks
