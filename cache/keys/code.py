@@ -11,6 +11,7 @@ file changed since this process began is refused.
 
 import ast
 import sys
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -204,6 +205,8 @@ def _read(module: _Module) -> _Source:
 
 
 def _edited(file: Path) -> str:
+    if file.stat().st_ctime > time.time():
+        return f"{file} was changed in the future: the clock was set back; set it right, or wait until then"
     return f"{file} was edited since this Python began, and may have been imported before: restart Python (the kernel)"
 
 

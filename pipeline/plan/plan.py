@@ -165,8 +165,10 @@ class _Planner:
         if recipe is None:
             return self._not_there(step, None, self._pending(step, self._open_inputs(step)))
         if entry is None or damage or step.product in self.forced:
-            changes = (Change("forced", ABSENT, step.product),) if entry and not damage else None
-            return self._not_there(step, recipe, changes or self._changes(step, recipe), damage)
+            changes = self._changes(step, recipe)
+            if entry and not damage:  # made again it comes out equal, or the run stops: what follows from it is there
+                changes, self.digests[step.id] = (Change("forced", ABSENT, step.product),), entry.digest
+            return self._not_there(step, recipe, changes, damage)
         self.digests[step.id] = entry.digest
         return Planned(step, "hit", recipe.key, entry.digest, seconds=entry.seconds)
 
