@@ -20,9 +20,13 @@ def keep_one_thread() -> None:
 def one_thread() -> Iterator[None]:
     """Make torch use one thread an operation in the calling thread, and as many as before after that.
 
-    As a decorator, for the time of each call.
+    As a decorator, for the time of each call. A thread that has one already sets nothing: what is set last is what new
+    threads take over.
     """
     before = torch.get_num_threads()
+    if before == 1:
+        yield
+        return
     torch.set_num_threads(1)
     try:
         yield

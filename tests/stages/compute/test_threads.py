@@ -51,3 +51,31 @@ def test_a_thread_of_a_pool_keeps_one_when_another_thread_ends_its_call() -> Non
     finally:
         torch.set_num_threads(before)
     assert found == [1]
+
+
+def test_calls_that_overlap_leave_new_threads_as_many_as_before() -> None:
+    found, inside, ended = [], threading.Event(), threading.Event()
+
+    def overlap() -> None:
+        with one_thread():
+            inside.set()
+            ended.wait(60)
+
+    def count() -> None:
+        found.append(torch.get_num_threads())
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(3)
+    try:
+        with one_thread():
+            thread = threading.Thread(target=overlap)
+            thread.start()
+            inside.wait(60)
+        ended.set()
+        thread.join()
+        new = threading.Thread(target=count)
+        new.start()
+        new.join()
+    finally:
+        torch.set_num_threads(before)
+    assert found == [3]
