@@ -9,7 +9,8 @@ from semidense.stages.transforms.gray import gray_views
 
 _UNITS = 16
 """OpenCV's disparities are whole multiples of 1/16 px, and their number must be a multiple of 16 too."""
-_OFF = -1
+_UNCHECKED = 1_000_000
+"""A left-right difference that no pixel reaches, px: OpenCV takes 0 and less for 1, and drops what differs by more."""
 _SPECKLE_RANGE = 2
 """Largest step within a patch, px."""
 
@@ -28,20 +29,24 @@ def match_semi_global(
             by their edge, and every pixel is answered.
 
     Returns:
-        (y, x) float32, px, in steps of 1/16; NaN where nothing is reported.
+        (y, x) float32, px, in steps of 1/16; NaN where nothing is reported: with ``checked`` everywhere if the range,
+        rounded up to whole sixteens, is too wide for the image.
     """
     import cv2
 
     disparities = params.disparities
+    searched = -(-len(disparities) // _UNITS) * _UNITS
+    if checked and left.shape[1] - (disparities[0] + searched) <= params.window // 2:  # OpenCV raises here
+        return np.full(left.shape, np.nan, np.float32)
     margin = 0 if checked else max(abs(disparities[0]), abs(disparities[-1])) + _UNITS
     left, right = (np.pad(view, ((0, 0), (margin, margin)), mode="edge") for view in (left, right))
     matcher = cv2.StereoSGBM.create(
         minDisparity=disparities[0],
-        numDisparities=-(-len(disparities) // _UNITS) * _UNITS,
+        numDisparities=searched,
         blockSize=params.window,
         P1=params.p1,
         P2=params.p2,
-        disp12MaxDiff=params.tolerance if checked else _OFF,
+        disp12MaxDiff=params.tolerance if checked else _UNCHECKED,
         uniquenessRatio=params.uniqueness if checked else 0,
         speckleWindowSize=params.speckle if checked else 0,
         speckleRange=_SPECKLE_RANGE,

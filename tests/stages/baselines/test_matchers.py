@@ -147,3 +147,46 @@ def test_sgm_finds_nothing_beyond_its_range(checked: bool) -> None:
     found = match_semi_global(left, right, SgmParams(d_min=0, d_max=4), checked=checked)
     assert np.nanmax(found, initial=0) <= 4
     assert np.isnan(found[:, 16:]).any() == checked
+
+
+def occluded_pair() -> tuple[np.ndarray[Any, np.dtype[np.uint8]], ...]:
+    """Return two noisy views of a square that stands 9 px before its ground."""
+    rng = np.random.default_rng(0)
+    ground, square = (rng.integers(0, 256, shape, np.uint8) for shape in ((48, 90), (24, 30)))
+    left, right = ground[:, 2:].copy(), ground[:, :-2].copy()
+    left[12:36, 40:70], right[12:36, 29:59] = square, square
+    return tuple(np.clip(view + rng.normal(0, 9, view.shape), 0, 255).astype(np.uint8) for view in (left, right))
+
+
+def test_the_dense_map_of_sgm_has_a_disparity_everywhere() -> None:
+    pytest.importorskip("cv2")
+    from semidense.stages.baselines.sgm import match_semi_global
+
+    dense, checked = (
+        match_semi_global(*occluded_pair(), SgmParams(d_min=0, d_max=15), checked=c) for c in (False, True)
+    )
+    assert np.isfinite(dense).all()
+    assert np.isnan(checked[:, 16:]).any(), "the pair has pixels that fail the left-right check"
+
+
+@pytest.mark.parametrize(
+    ("width", "settings", "answered"),
+    [
+        pytest.param(17, {"d_min": 0, "d_max": 8}, False, id="sixteen disparities and half the block"),
+        pytest.param(18, {"d_min": 0, "d_max": 8}, True, id="one column more"),
+        pytest.param(37, {"d_min": 0, "d_max": 16, "window": 11}, False, id="17 disparities are searched as 32"),
+        pytest.param(9, {"d_min": -8, "d_max": 0}, False, id="a negative range"),
+    ],
+)
+def test_sgm_says_nothing_of_an_image_too_narrow_for_its_range(
+    width: int, settings: dict[str, int], answered: bool
+) -> None:
+    pytest.importorskip("cv2")
+    from semidense.stages.baselines.sgm import match_semi_global
+
+    view = np.random.default_rng(0).integers(0, 256, (40, width), np.uint8)
+    params = SgmParams(uniqueness=0, speckle=0, **settings)
+    checked = match_semi_global(view, view, params, checked=True)
+    assert checked.shape == view.shape and checked.dtype == np.float32
+    assert np.isfinite(checked).any() == answered
+    assert np.isfinite(match_semi_global(view, view, params, checked=False)).all()
