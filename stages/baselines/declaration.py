@@ -64,7 +64,9 @@ class SgmParams(RangeParams):
     speckle: int = Field(
         100, ge=0, description="size of the largest isolated patch that is dropped, px; 0: drop no patch"
     )
-    tolerance: int = Field(1, ge=0, description="largest left-right difference that is kept, px")
+    tolerance: int = Field(
+        1, ge=1, description="largest left-right difference that is kept, px; OpenCV has none below 1"
+    )
 
     @field_validator("window")
     @classmethod

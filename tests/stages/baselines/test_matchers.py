@@ -121,6 +121,7 @@ def test_a_range_is_needed(stage: Stage) -> None:
     [
         pytest.param(CENSUS, {"window": 4}, "no centre", id="an even window"),
         pytest.param(SGM, {"p1": 9, "p2": 9}, "above p1", id="penalties that do not rise"),
+        pytest.param(SGM, {"tolerance": 0}, "greater than or equal to 1", id="a tolerance that OpenCV takes for 1"),
         pytest.param(SNCC, {"d_min": 3, "d_max": 2}, "below d_min", id="a range the wrong way round"),
     ],
 )
