@@ -139,6 +139,8 @@ class Outcome(NamedTuple):
 def outcome(table: Table, mapped: Floats, max_error: float, tolerance: Floats) -> Outcome:
     """Return what comes of keeping in each scene as many pixels as are expected to keep the error.
 
+    The pixels of the first bin are never kept: it holds what a veto set to 0.
+
     Args:
         table: of scenes that the networks have not seen.
         mapped: calibrated log-odds at ``EDGES``.
@@ -146,12 +148,13 @@ def outcome(table: Table, mapped: Floats, max_error: float, tolerance: Floats) -
         tolerance: (scene,) error up to which a pixel of the scene was counted as right, px.
     """
     pixels = table.right + table.wrong
-    sums, wrong = _above(pixels), _above(table.wrong)
-    expected = _above(pixels * probability(-(mapped[1:] + mapped[:-1]) / 2))
+    total, seen = pixels.sum(axis=1), pixels[:, 1:]
+    sums, wrong = _above(seen), _above(table.wrong[:, 1:])
+    expected = _above(seen * probability(-(mapped[2:] + mapped[1:-1]) / 2))
     kept, errors = [], []
     for scene, reached in enumerate((sums > 0) & (expected <= max_error * sums)):
         least = int(np.argmax(reached))
-        kept.append(sums[scene, least] / max(sums[scene, 0], 1) if reached.any() else 0.0)
+        kept.append(sums[scene, least] / total[scene] if reached.any() else 0.0)
         if reached.any():
             errors.append(wrong[scene, least] / sums[scene, least])
     tolerances = tuple(np.unique(tolerance).tolist())

@@ -73,6 +73,11 @@ def test_a_wanted_error_by_hand() -> None:
     assert (strict.error, strict.kept) == (0, pytest.approx(0.8 / 2)), "the hard scene keeps nothing"
 
 
+def test_a_vetoed_pixel_is_not_kept_and_counts_as_one_of_the_scene() -> None:
+    found = outcome(table({0: (250, 40), HALF: (700, 10)}), np.full(BINS + 1, 4.0), 0.35, np.ones(1))
+    assert (found.kept, found.error) == (pytest.approx(0.71), pytest.approx(10 / 710))
+
+
 def test_without_a_sure_pixel_nothing_is_kept() -> None:
     found = outcome(table({HALF: (9, 1)}), np.zeros(BINS + 1), 0.1, np.ones(1))
     assert found.kept == 0 and np.isnan(found.error)
