@@ -27,7 +27,7 @@ class ChannelsParams(Params):
     companion_rays: int = Field(default=8, description="number of rays of the companion transform: 4, 8 or 16")
     gray: Literal["standardized", "raw"] = Field(
         default="standardized",
-        description="scale the gray channel to (gray - mean) / max(std, 1) of the whole view; false: to gray / 255",
+        description="gray channel; standardized: (gray - mean) / max(std, 1) of the whole view; raw: gray / 255",
     )
     use: tuple[Channel, ...] = Field(
         default=ORDER, min_length=1, description="channels that the networks see, in the order gray, rank, companion"

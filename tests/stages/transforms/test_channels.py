@@ -1,3 +1,5 @@
+from typing import get_args
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -141,3 +143,8 @@ def test_refuses_moments_of_another_shape() -> None:
 def test_refuses_parameters(field: dict[str, object], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         ChannelsParams.model_validate(field)
+
+
+def test_the_description_of_gray_names_its_values() -> None:
+    gray = ChannelsParams.model_fields["gray"]
+    assert all(f"{value}: " in str(gray.description) for value in get_args(gray.annotation))
