@@ -137,11 +137,17 @@ def families(names: Sequence[str], fewest: int = 2) -> list[str]:
 
 
 def require_trainable(config: Config, product: str) -> None:
-    """Refuse to train with another light on the gray channel where there is none: it would fall on another channel.
+    """Refuse to train with another light where the first channel is not a standardised gray one.
 
     Raises:
-        UsageError: if the product's ``relight`` is on and ``channels.use`` leaves gray out.
+        UsageError: if the product's ``relight`` is on and ``channels.use`` leaves gray out or ``channels.gray`` is raw.
     """
-    if getattr(config.section(product), "relight", 0) and "gray" not in config.of("channels", ChannelsParams).use:
+    if not getattr(config.section(product), "relight", 0):
+        return
+    channels = config.of("channels", ChannelsParams)
+    if "gray" not in channels.use:
         told = f"{product}.relight changes the light of the gray channel, which channels.use leaves out"
+        raise UsageError(f"{told}: set {product}.relight=0")
+    if channels.gray == "raw":
+        told = f"{product}.relight changes the light of a standardized gray channel, and channels.gray is raw"
         raise UsageError(f"{told}: set {product}.relight=0")

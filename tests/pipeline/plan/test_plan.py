@@ -139,7 +139,7 @@ def test_the_run_s_own_plan_is_all_hits(trained_task: Task) -> None:
     ("setting", "stale", "change"),
     [
         ("channels.rank_window=15", ALL - ABOVE_CHANNELS, "params.rank_window: 31 -> 15"),
-        ("channels.gray=raw", ALL - ABOVE_CHANNELS, "params.gray: standardized -> raw"),
+        ("channels.companion_rays=4", ALL - ABOVE_CHANNELS, "params.companion_rays: 8 -> 4"),
         ("matching_samples.seed=1", ALL - {"images", "truth", "channels", "distinctiveness"}, "params.seed: 0 -> 1"),
         ("matching_net.steps=3", ALL - ABOVE_CHANNELS - {"channels"}, "params.steps: 2 -> 3"),
         ("costvolume.d_max=7", ALL - ABOVE_CHANNELS - {"channels", "matching_net"}, "params.d_max: 8 -> 7"),

@@ -452,6 +452,13 @@ def test_no_light_falls_on_other_channels_than_gray() -> None:
         graph(without_gray, "matching_net.relight=0", "costvolume.mode=fast", train=True)
 
 
+def test_no_light_falls_on_a_raw_gray_channel() -> None:
+    with pytest.raises(UsageError, match=r"channels\.gray is raw: set matching_net\.relight=0"):
+        graph("channels.gray=raw", train=True)
+    assert graph("channels.gray=raw", "matching_net.relight=0", train=True)
+    assert graph('channels.use=["rank"]', "channels.gray=raw", "matching_net.relight=0", train=True)
+
+
 def test_a_product_may_be_made_by_another_stage() -> None:
     pure = "confidence.veto=false"  # the veto asks our own costs
     plain, used = graph(pure), graph(pure, "use.disparity=sgm", "sgm.uniqueness=3")
