@@ -38,7 +38,7 @@ def right_costs(costs: NDArray[Any], d_min: int) -> NDArray[Any]:
 def agreeing(disparity: NDArray[np.float32], right: NDArray[np.float32], tolerance: float = 1.0) -> NDArray[np.float32]:
     """Keep the disparities that the right view's map confirms.
 
-    ``|D(y, x) - D_right(y, x - D(y, x))| <= tolerance``, the right pixel being the nearest one.
+    ``|D(y, x) - D_right(y, x - D(y, x))| <= tolerance``, the right map being read at the nearest column.
 
     Args:
         disparity: (y, x) float32, left view, px; NaN unknown.
@@ -46,7 +46,8 @@ def agreeing(disparity: NDArray[np.float32], right: NDArray[np.float32], toleran
         tolerance: px.
 
     Returns:
-        (y, x) float32; NaN where the maps differ by more, the right one has none, or its pixel lies outside the image.
+        (y, x) float32; NaN where the maps differ by more, the right one has none, or ``x - D`` lies outside
+        [0, width - 1].
 
     Raises:
         StageError: if the shapes differ.
@@ -58,10 +59,10 @@ def agreeing(disparity: NDArray[np.float32], right: NDArray[np.float32], toleran
         raise StageError(f"left disparity has shape {disparity.shape}, right {right.shape}: they must be equal")
     rows, columns = np.nonzero(np.isfinite(disparity))
     own = disparity[rows, columns]
-    landing = np.rint(columns - own).astype(np.int64)
-    inside = (landing >= 0) & (landing < right.shape[1])
+    landing = (columns - own).astype(np.float32)
+    inside = (landing >= 0) & (landing <= right.shape[1] - 1)
     rows, columns, own, landing = (each[inside] for each in (rows, columns, own, landing))
-    confirmed = np.abs(own - right[rows, landing]) <= tolerance  # NaN confirms nothing
+    confirmed = np.abs(own - right[rows, np.rint(landing).astype(np.intp)]) <= tolerance  # NaN confirms nothing
     kept = np.full_like(disparity, np.nan)
     kept[rows[confirmed], columns[confirmed]] = own[confirmed]
     return kept

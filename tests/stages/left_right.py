@@ -20,5 +20,6 @@ CASES = [
     pytest.param([N, 0, 0], [0, 0, N], [NO, YES, NO], id="unknown in either view"),
     pytest.param([0, 0, 0, 2, 2], [0, 2, 2, 0, 0], [YES, NO, NO, YES, YES], id="covered by a nearer pixel"),
     pytest.param([0.6, 0.6, 0.6], [0.6, 9, 0.6], [NO, YES, NO], id="read at the nearest column"),
+    pytest.param([0.4, 0.4, -0.4], [0.4, 0.4, -0.4], [NO, YES, NO], id="0.4 px outside on either side"),
 ]
 """Left map, right map, and which left pixels are confirmed."""
