@@ -2,7 +2,7 @@
 
 Sort the n pixels by falling confidence. Keeping the first k, with W_k wrong among them, gives density ``k / n`` and
 error ``W_k / k``. Pixels of equal confidence have no order: W_k is then its mean over all orders of theirs, which is a
-straight line between the ends of their group. A NaN confidence ranks below every number.
+straight line between the ends of their group. A NaN confidence counts as minus infinity.
 
 Source: Hu & Mordohai, "A quantitative evaluation of confidence measures for stereo vision", PAMI 2012.
 """
@@ -83,7 +83,7 @@ def auc(confidence: NDArray[Any], correct: NDArray[np.bool_]) -> float:
     ``e / n``; one that is the same everywhere gives the error rate e.
 
     Args:
-        confidence: any shape, higher is surer; NaN is surest to be wrong.
+        confidence: any shape, higher is surer; NaN counts as minus infinity.
         correct: bool, as many; an unreported pixel is not correct.
 
     Returns:
@@ -129,7 +129,7 @@ def error_at_density(confidence: NDArray[Any], correct: NDArray[np.bool_], densi
     ``100 W_k / k`` at ``k = density n``; between whole k, W is a straight line. Ties as in ``auc``.
 
     Args:
-        confidence: any shape, higher is surer; NaN is surest to be wrong.
+        confidence: any shape, higher is surer; NaN counts as minus infinity.
         correct: bool, as many; an unreported pixel is not correct, so a density above the share of reported pixels
             counts some of them as wrong.
         density: share of the pixels that is kept, a fraction in (0, 1].
