@@ -14,7 +14,7 @@ def cost_margin(costs: NDArray[Any]) -> NDArray[np.float32]:
     """Return how much more than the least cost the least of the other disparities costs, the two beside it left out.
 
     Args:
-        costs: (y, x, d) float16 or float32, log-odds of a mismatch; NaN is an invalid cell.
+        costs: (y, x, d) float16 or float32, log-odds of a mismatch; NaN is an invalid cell, infinity a valid cost.
 
     Returns:
         (y, x) float32 in [0, 40]: 0 where another disparity costs as little, 40 where none is valid; NaN where no cost
@@ -44,11 +44,14 @@ def _write_margin(costs: NDArray[np.float32], largest: np.float32, margin: NDArr
             for d in range(depth):
                 if costs[y, x, d] < least or (best < 0 and costs[y, x, d] == least):
                     best, least = d, costs[y, x, d]
-            rival = np.float32(np.inf)
+            other, rival = -1, np.float32(np.inf)
             for d in range(depth):
-                if abs(d - best) > 1 and costs[y, x, d] < rival:
-                    rival = costs[y, x, d]
-            margin[y, x] = np.float32(np.nan) if best < 0 else _difference(least, rival, largest)
+                if abs(d - best) > 1 and costs[y, x, d] <= rival:
+                    other, rival = d, costs[y, x, d]
+            if best < 0:
+                margin[y, x] = np.float32(np.nan)
+            else:
+                margin[y, x] = largest if other < 0 else _difference(least, rival, largest)
 
 
 @kernel

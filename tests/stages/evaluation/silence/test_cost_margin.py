@@ -22,6 +22,8 @@ NAN, INF = np.nan, np.inf
         pytest.param([NAN, NAN], NAN, id="nothing is valid"),
         pytest.param([INF, INF, INF], 0, id="infinite costs are equal"),
         pytest.param([1, INF, INF], 40, id="an infinite rival"),
+        pytest.param([NAN, INF, NAN], 40, id="an infinite winner without a rival"),
+        pytest.param([INF, INF, NAN], 40, id="an infinite winner and what lies beside it"),
     ],
 )
 @pytest.mark.parametrize("dtype", [np.float16, np.float32])
