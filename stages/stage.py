@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 T = TypeVar("T")
 Array = NDArray[Any]
@@ -88,6 +88,30 @@ class Params(BaseModel):
 
 class NoParams(Params):
     """The section of a stage that has nothing to set."""
+
+
+class RangeParams(Params):
+    """The disparities that are looked through."""
+
+    d_min: int | None = Field(None, description="smallest disparity, px; default: the scene's own")
+    d_max: int | None = Field(None, description="largest disparity, px; default: the scene's own")
+
+    @property
+    def disparities(self) -> range:
+        """The disparities, once both ends are known.
+
+        Raises:
+            StageError: if one is not.
+        """
+        if self.d_min is None or self.d_max is None:
+            raise StageError("the disparity range has an open end: give d_min and d_max")
+        return range(self.d_min, self.d_max + 1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "RangeParams":
+        if self.d_min is not None and self.d_max is not None and self.d_max < self.d_min:
+            raise ValueError(f"d_max {self.d_max} lies below d_min {self.d_min}")
+        return self
 
 
 @dataclass(frozen=True)

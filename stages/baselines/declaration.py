@@ -7,34 +7,10 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from semidense.stages.learning.schedule import SHARDS, Schedule
-from semidense.stages.stage import Always, Output, Params, Stage, StageError
+from semidense.stages.stage import Always, Output, Params, RangeParams, Stage
 
 _DENSE = Output("dense", ("y", "x"), "float32", "px", "disparity of every pixel, before anything is filtered")
 _CHECKED = Output("disparity", ("y", "x"), "float32", "px", "disparity after the matcher's own checks; NaN: dropped")
-
-
-class RangeParams(Params):
-    """The disparities that are looked through."""
-
-    d_min: int | None = Field(None, description="smallest disparity, px; default: the scene's own")
-    d_max: int | None = Field(None, description="largest disparity, px; default: the scene's own")
-
-    @property
-    def disparities(self) -> range:
-        """The disparities, once both ends are known.
-
-        Raises:
-            StageError: if one is not.
-        """
-        if self.d_min is None or self.d_max is None:
-            raise StageError("a matcher needs a disparity range: give d_min and d_max")
-        return range(self.d_min, self.d_max + 1)
-
-    @model_validator(mode="after")
-    def _ordered(self) -> "RangeParams":
-        if self.d_min is not None and self.d_max is not None and self.d_max < self.d_min:
-            raise ValueError(f"d_max {self.d_max} lies below d_min {self.d_min}")
-        return self
 
 
 class CheckedParams(RangeParams):

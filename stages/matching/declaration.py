@@ -6,11 +6,11 @@ from typing import Any, ClassVar, Literal, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from semidense.stages.compute.precision import Precision
 from semidense.stages.learning.schedule import SHARDS, Schedule
-from semidense.stages.stage import Network, Output, Params, Stage, StageError, Truth
+from semidense.stages.stage import Network, Output, Params, RangeParams, Stage, Truth
 from semidense.stages.transforms.declaration import Channels
 
 Form = Literal["dense", "patch"]
@@ -88,11 +88,9 @@ class MatchingNetParams(Schedule):
     seed: int = Field(0, ge=0, description="seed of the weights and the augmentation")
 
 
-class CostVolumeParams(Params):
+class CostVolumeParams(RangeParams):
     """Which cells are computed, and in which arithmetic."""
 
-    d_min: int | None = Field(None, description="smallest disparity, px; default: the scene's own")
-    d_max: int | None = Field(None, description="largest disparity, px; default: the scene's own")
     precision: Precision = Field(
         "auto", description="number format: float32, bfloat16, or auto: the one that is faster on this CPU"
     )
@@ -121,23 +119,6 @@ class CostVolumeParams(Params):
     def inputs(self) -> tuple[str, ...]:
         """The products that the mode needs."""
         return ("channels", *_NETS[self.mode])
-
-    @property
-    def disparities(self) -> range:
-        """The disparities of the volume, once both ends are known.
-
-        Raises:
-            StageError: if one is not.
-        """
-        if self.d_min is None or self.d_max is None:
-            raise StageError("the cost volume needs a disparity range: give d_min and d_max")
-        return range(self.d_min, self.d_max + 1)
-
-    @model_validator(mode="after")
-    def _ordered(self) -> "CostVolumeParams":
-        if self.d_min is not None and self.d_max is not None and self.d_max < self.d_min:
-            raise ValueError(f"d_max {self.d_max} lies below d_min {self.d_min}")
-        return self
 
     @model_serializer(mode="wrap")
     def _that_matter(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:

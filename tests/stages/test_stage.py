@@ -4,7 +4,20 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from semidense.stages.stage import NoParams, Output, Params, Silent, Stage, StageError, by_scene, require_shape
+from semidense.stages.baselines.declaration import CheckedParams, SgmParams, WindowParams
+from semidense.stages.evaluation.silence.declaration import DistinctivenessParams
+from semidense.stages.matching.declaration import CostVolumeParams
+from semidense.stages.stage import (
+    NoParams,
+    Output,
+    Params,
+    RangeParams,
+    Silent,
+    Stage,
+    StageError,
+    by_scene,
+    require_shape,
+)
 
 OUTPUT = Output("total", ("y", "x"), "float32", "1", "a sum")
 STAGE = Stage("total", ("images",), (OUTPUT,), "json.decoder:JSONDecoder")
@@ -47,6 +60,20 @@ def test_declarations_and_sections_are_frozen() -> None:
 def test_a_section_refuses_what_it_does_not_know() -> None:
     with pytest.raises(ValidationError, match="Extra inputs are not permitted"):
         Section.model_validate({"height": 4})
+
+
+@pytest.mark.parametrize("section", [CheckedParams, CostVolumeParams, DistinctivenessParams, SgmParams, WindowParams])
+def test_a_range_is_the_right_way_round(section: type[RangeParams]) -> None:
+    assert section(d_min=-2, d_max=-2).disparities == range(-2, -1)
+    with pytest.raises(ValidationError, match="d_max 2 lies below d_min 9"):
+        section(d_min=9, d_max=2)
+    assert list(section.model_fields)[:2] == ["d_min", "d_max"]
+
+
+@pytest.mark.parametrize("ends", [{}, {"d_min": 0}, {"d_max": 9}])
+def test_an_open_range_has_no_disparities(ends: dict[str, int]) -> None:
+    with pytest.raises(StageError, match="disparity range has an open end: give d_min and d_max"):
+        assert RangeParams(**ends).disparities
 
 
 def test_by_scene() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from semidense.stages.stage import DisparityMap, Output, Params, Stage, StageError
+from semidense.stages.stage import DisparityMap, Output, RangeParams, Stage
 from semidense.stages.transforms.window import require_window
 
 NEAREST_REPETITION = 4
@@ -18,11 +18,9 @@ LARGEST_MARGIN = 40.0
 """Margin of a pixel whose costs have no rival of the winner, log-odds."""
 
 
-class DistinctivenessParams(Params):
+class DistinctivenessParams(RangeParams):
     """From which difference on a patch can be told from the patches beside it."""
 
-    d_min: int | None = Field(None, description="smallest disparity, px; default: the scene's own")
-    d_max: int | None = Field(None, description="largest disparity, px; default: the scene's own")
     window: int = Field(9, ge=3, le=101, description="side of the patch, px, odd")
     noise: float = Field(0.1, gt=0, le=255, description="mean difference that tells nothing, gray levels")
     share: float = Field(
@@ -47,9 +45,7 @@ class DistinctivenessParams(Params):
         Raises:
             StageError: if an end of the range is open.
         """
-        if self.d_min is None or self.d_max is None:
-            raise StageError("distinctiveness needs a disparity range: give d_min and d_max")
-        return self.d_max - self.d_min
+        return len(self.disparities) - 1
 
 
 class Distinctiveness(TypedDict):
