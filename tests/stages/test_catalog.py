@@ -34,8 +34,8 @@ def test_the_function_exists_and_takes_what_the_declaration_says(stage: Stage) -
 
 @stages
 def test_the_section_has_defaults_and_every_field_a_description(stage: Stage) -> None:
-    assert stage.params() == stage.params()
-    assert all(field.description for field in stage.params.model_fields.values())
+    assert all(field.description and not field.is_required() for field in stage.params.model_fields.values())
+    stage.params()  # raises if a default is outside its own limits
 
 
 @stages

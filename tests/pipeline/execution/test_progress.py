@@ -86,9 +86,11 @@ def test_what_was_there_is_not_announced(capsys: pytest.CaptureFixture[str]) -> 
     assert capsys.readouterr() == ("", "")
 
 
-def test_a_step_that_was_never_begun_is_ignored() -> None:
+def test_a_step_that_was_never_begun_is_ignored(capsys: pytest.CaptureFixture[str], now: list[float]) -> None:
     with ProgressWatch() as watch:
+        now[0] = 30.0
         watch.advanced(TILED, 1, 2, "")
+    assert capsys.readouterr() == ("", "")
 
 
 class Terminal(io.StringIO):
