@@ -22,8 +22,9 @@ def o1_features(disparity: NDArray[np.float32], rows: NDArray[Any], columns: NDA
     """Return O1's features of some pixels of a raw disparity map.
 
     For each window of side 5, 7, 9 and 11, cut at the border and without its unknown pixels: the share of the window
-    that has the centre's disparity; minus the logarithm of the share of different disparities; the median; the
-    distance of the centre from it; the variance. Disparities count by whole pixels where they are compared.
+    that has the centre's disparity; minus the logarithm of the share of different disparities; the median, of
+    an even number of values the upper middle one; the distance of the centre from it; the variance. Disparities count
+    by whole pixels where they are compared.
 
     Args:
         disparity: (y, x) float32, px, NaN unknown.

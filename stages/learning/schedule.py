@@ -1,4 +1,4 @@
-"""How long and how fast a network learns: the part of their settings that both networks share."""
+"""How long and how fast a network learns: the part of their settings that all networks share."""
 
 from collections.abc import Sequence
 from math import cos, pi

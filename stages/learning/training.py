@@ -1,4 +1,4 @@
-"""The training loop that both networks share: shards, clipping, a schedule, exact resume.
+"""The training loop that all networks share: shards, clipping, a schedule, exact resume.
 
 A step's loss is the mean over a fixed number of *shards*, each computed by one thread on one core,
 and the gradients are added in the shards' order. So the result does not depend on how many cores

@@ -61,7 +61,7 @@ def save_weights(product: str, arrays: Arrays, metadata: Mapping[str, Any]) -> b
     """Return a trained network as a safetensors file.
 
     Args:
-        product: ``matching_net``, ``descriptor_net`` or ``evaluation_net``.
+        product: ``matching_net``, ``descriptor_net``, ``evaluation_net``, ``evidence_net`` or ``foreign_net``.
         arrays: those of the product: ``parameters`` float32 (parameter,) and ``loss`` float32 (step,).
         metadata: JSON that says how they were made, such as the training configuration.
 

@@ -1,4 +1,4 @@
-"""The fast cost volume: dot products of descriptors, computed once a view (see ``descriptor_net``).
+"""The fast cost volume: dot products of descriptors, computed once a view (see ``descriptors.net``).
 
 Of a row, all products of some left descriptors with those that they may meet in the right view are one product of two
 matrices; the cells of the volume are its diagonals.

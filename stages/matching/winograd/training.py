@@ -1,6 +1,6 @@
 """Gradients through conv3 and the compact head in the transformed domain.
 
-Every step of ``transformed`` but the ReLUs is linear, so its gradient is its transpose: transforms are transposed,
+Every step of ``winograd.volume`` but the ReLUs is linear, so its gradient is its transpose: transforms are transposed,
 products become products with the transposed kernels, tiles that overlapped are added up. What is cheap to make
 again (the joined views) is not kept.
 """

@@ -210,7 +210,7 @@ def run_blocks(net: TransformedNet, left: Tensor, right: Tensor, corners: Sequen
 
     Args:
         net: the transformed kernels.
-        left: (l, y, x, JOINED) float32, contiguous: the embedded left view.
+        left: (l, y, x, JOINED) float32 or bfloat16 as the kernels, contiguous: the embedded left view.
         right: likewise the right view.
         corners: of each block; 6 rows and columns more than it has cells are read from there.
         shape: rows and columns of a block, in tiles of 4 x 4 cells.

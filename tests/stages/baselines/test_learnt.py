@@ -53,6 +53,13 @@ def test_an_unknown_centre_has_no_features_and_unknown_neighbours_do_not_count()
     assert beside[0] == 1, "all known neighbours agree"
 
 
+def test_the_median_of_an_even_number_is_the_upper_middle_value() -> None:
+    disparity = np.full((11, 11), np.nan, np.float32)
+    disparity[5, 5:7] = 4, 8
+    found = o1_features(disparity, np.array([5]), np.array([5])).reshape(4, 5)
+    assert (found[:, 2:4] == [8, 4]).all()
+
+
 def test_o1_learns_and_its_tiles_are_the_whole() -> None:
     pytest.importorskip("sklearn", reason="comes with the extra 'baselines'")
     forest = O1_FOREST.function()(ForestParams(samples=2000), split(scene(0), scene(1)))

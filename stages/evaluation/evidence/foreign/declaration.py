@@ -43,7 +43,7 @@ OF_CELLS = (
 
 - ``cost``: log-odds of a mismatch at the disparity, between the two cells beside it; and its means.
 - ``excess``: by how much that lies above the least of the cells from 2 px below to 3 px above; and its means.
-- ``beside``: how much more the cells 2 px away cost.
+- ``beside``: how much more the outer two of these cells cost in the mean, 2 px below and 3 px above a whole disparity.
 - ``rival``: by how much the cost lies above that of another pixel of the map that leads to the same right pixel.
 - ``judged``: 1 with a right view, else 0.
 """
