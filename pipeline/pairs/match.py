@@ -18,7 +18,7 @@ from semidense.datasets.pairs.options import PairOptions, pair_spec
 from semidense.pipeline.api import Task, run, status
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import findings, without_texture
-from semidense.pipeline.pairs.wishes import Wishes, wished
+from semidense.pipeline.pairs.wishes import Wishes, refuse_unknown, wished
 from semidense.pipeline.plan.config import Settings
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made
@@ -29,6 +29,7 @@ from semidense.stages.disparity import depth as geometry
 from semidense.stages.evaluation.calibration.table import Outcome, Table, outcome
 
 Unit = Literal["mm", "cm", "m"]
+_NAMED = ("d_min", "d_max", "calib", "unit", "settings", "preset", "cache", "watch", "workers")
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,6 +241,7 @@ def match(
     Raises:
         UsageError, DatasetError, CacheError, StageError: what the user can mend, in one line.
     """
+    refuse_unknown("match", wishes, _NAMED)
     files = [calib] if isinstance(calib, str | PathLike) else calib
     options = PairOptions(tuple(fspath(file) for file in files), unit, d_min, d_max)
     dataset = _dataset(left, right, options)

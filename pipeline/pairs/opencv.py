@@ -1,7 +1,6 @@
 """A replacement for OpenCV's ``StereoSGBM`` with the same calls."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Any, Self
 
@@ -10,12 +9,13 @@ from numpy.typing import NDArray
 
 from semidense.pipeline.api import Task
 from semidense.pipeline.pairs.match import match
-from semidense.pipeline.pairs.wishes import Wishes, wished
+from semidense.pipeline.pairs.wishes import Wishes, refuse_unknown, wished
+from semidense.pipeline.plan.arguments import require_number
 from semidense.pipeline.plan.config import Settings, setting_texts
-from semidense.pipeline.plan.errors import UsageError, nearest
+from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.presets import OWN_PAIRS
 
-_WISHES = tuple(field.name for field in fields(Wishes))
+_NAMED = ("minDisparity", "numDisparities", "disp12MaxDiff", "settings", "preset", "cache")
 _WITHOUT_COUNTERPART = (
     *("blockSize", "P1", "P2", "preFilterCap", "preFilterType", "preFilterSize", "textureThreshold"),
     *("uniquenessRatio", "speckleWindowSize", "speckleRange", "mode"),
@@ -67,7 +67,9 @@ class StereoMatcher:
         if count < 1:
             raise UsageError(f"numDisparities is {count}; it must be at least 1")
         _refuse_unknown(wishes)
-        if disp12MaxDiff >= 0:
+        if require_number("disp12MaxDiff", disp12MaxDiff) >= 0:
+            if "tolerance" in wishes:
+                raise UsageError("disp12MaxDiff and tolerance both say what the right view's map drops; give one")
             wishes |= {"left_right": True, "tolerance": float(disp12MaxDiff)}
         wished(Task(settings=settings, preset=preset), Wishes(**wishes))
         self._range = range(low, low + count)
@@ -137,9 +139,7 @@ def _refuse_unknown(wishes: Mapping[str, object]) -> None:
             raise UsageError(
                 f"{name} of OpenCV has no counterpart here: the networks decide what matches; leave it out"
             )
-        if name not in _WISHES:
-            known = ("minDisparity", "numDisparities", "disp12MaxDiff", "settings", "preset", "cache", *_WISHES)
-            raise UsageError(f"StereoMatcher has no parameter {name!r}; {nearest(name, known)}")
+    refuse_unknown("StereoMatcher", wishes, _NAMED)
 
 
 def _rgb(view: NDArray[Any]) -> NDArray[Any]:

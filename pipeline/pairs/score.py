@@ -16,7 +16,7 @@ from semidense.pipeline.api import Task, run
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import same_picture
 from semidense.pipeline.pairs.match import Match, Unit
-from semidense.pipeline.pairs.wishes import Wishes
+from semidense.pipeline.pairs.wishes import Wishes, with_wishes
 from semidense.pipeline.plan.config import Settings
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.presets import FOREIGN
@@ -119,7 +119,7 @@ def score_one(
     workers: int | None = None,
 ) -> Score:
     """Score the map of a dataset's only scene; as `score`, with a ``Task`` for what all verbs share."""
-    task = task.and_settings(wishes.settings)
+    task = with_wishes(task, wishes)
     task = replace(task, dataset=task.open())
     result = run(task, wishes.product, watch=watch, scheduler=scheduler, workers=workers)
     return Score(task.open().scenes[0], wishes, result, ())

@@ -1,10 +1,12 @@
 """What to do with the raw map of a user's own pair."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 
 from semidense.pipeline.api import Task
+from semidense.pipeline.plan.arguments import require_flag, require_number
 from semidense.pipeline.plan.config import Config
-from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.errors import UsageError, nearest
 from semidense.pipeline.plan.shipped_weights import weights_of
 from semidense.stages.disparity.declaration import AggregatedParams, DisparityParams
 from semidense.stages.evaluation.filtering import SemidenseParams
@@ -22,10 +24,13 @@ class Wishes:
         calibrated: take and give the confidence as the probability that was measured there.
         within: error up to which these two count a disparity as right, px; None for the configuration's.
         left_right: drop what the right view's map contradicts by more than ``tolerance`` px.
-        tolerance: px.
+        tolerance: px; None for the configuration's, 1 by default.
         subpixel: move each whole disparity to the parabola's lowest point; maps that lie below a pixel already stay.
         fill: fill the holes with the background; the map is dense then, and partly guessed.
         right_view: make the right view's raw map too.
+
+    Raises:
+        UsageError: if a value is not of its type, or two contradict each other.
     """
 
     R: float | None = None
@@ -34,18 +39,26 @@ class Wishes:
     calibrated: bool = False
     within: float | None = None
     left_right: bool = False
-    tolerance: float = 1.0
+    tolerance: float | None = None
     subpixel: bool = False
     fill: bool = False
     right_view: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what contradicts itself."""
+        """Refuse values of another type, and what contradicts itself."""
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if isinstance(each.default, bool):
+                require_flag(each.name, value)
+            elif value is not None:
+                require_number(each.name, value)
         given = [name for name in ("R", "density", "max_error") if getattr(self, name) is not None]
         if len(given) > 1:
             raise UsageError(f"{' and '.join(given)} both say how much to keep; give one of them")
         if self.within is not None and self.max_error is None and not self.calibrated:
             raise UsageError("within says what a wanted error counts as right: give max-error or calibrated too")
+        if self.tolerance is not None and not self.left_right:
+            raise UsageError("tolerance says what left_right drops: give left_right too")
 
     @property
     def product(self) -> str:
@@ -71,6 +84,31 @@ class Wishes:
         return tuple(f"{name}={str(value).lower()}" for name, value in given.items() if value is not None)
 
 
+WISHES = tuple(each.name for each in fields(Wishes))
+
+
+def refuse_unknown(verb: str, given: Iterable[str], named: Iterable[str]) -> None:
+    """Refuse the first name that is no wish; ``named`` are the verb's own parameters: UsageError."""
+    for name in given:
+        if name not in WISHES:
+            raise UsageError(f"{verb} has no parameter {name!r}; {nearest(name, (*named, *WISHES))}")
+
+
+def with_wishes(task: Task, wishes: Wishes) -> Task:
+    """Return the task with the settings that the wishes come down to.
+
+    Raises:
+        UsageError: if a setting is not valid, or replaces the R that was wished.
+    """
+    task = task.and_settings(wishes.settings)
+    if wishes.R is not None and not task.configuration().of("semidense", SemidenseParams).by_R:
+        raise UsageError(
+            f"R = {wishes.R} says how much to keep, and so does semidense.density or semidense.max_error of the "
+            "settings; give one of them"
+        )
+    return task
+
+
 def wished(task: Task, wishes: Wishes) -> Task:
     """Return the task with the settings that the wishes come down to, checked before any image is read.
 
@@ -80,7 +118,7 @@ def wished(task: Task, wishes: Wishes) -> Task:
         UsageError: if a setting is not valid.
         StageError: if the wishes need a calibration, and none is known for such maps.
     """
-    task = task.and_settings(wishes.settings)
+    task = with_wishes(task, wishes)
     config = task.configuration()
     filtered_by = config.of("semidense", SemidenseParams)
     calibrated = filtered_by.calibrated or filtered_by.max_error is not None

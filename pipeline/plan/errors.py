@@ -86,17 +86,17 @@ _LACKING = {
 """What the machine may lack, and the line that says so."""
 
 
-def nearest(name: str, known: Iterable[str], prefix: str = "") -> str:
+def nearest(name: object, known: Iterable[str], prefix: str = "") -> str:
     """Return a hint: the nearest known name, or all of them if none is near."""
     names = list(known)
     folded = {item.lower(): item for item in names}
-    near = difflib.get_close_matches(name.lower(), folded, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(str(name).lower(), folded, n=1, cutoff=0.5)
     if near:
         return f"did you mean {prefix}{folded[near[0]]}?"
     return f"there are {', '.join(prefix + item for item in names)}" if names else "it has no settings"
 
 
 def shortened(value: object) -> str:
-    """Return a value as a message repeats it, the start of a very long one."""
-    text = repr(value)
+    """Return a value as a message repeats it: in one line, and of a very long one the start."""
+    text = " ".join(repr(value).splitlines())
     return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}… ({len(text):,} characters)"

@@ -76,7 +76,7 @@ def score(
     from semidense.datasets.pairs.options import PairOptions, pair_spec
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
-    from semidense.pipeline.pairs.wishes import Wishes
+    from semidense.pipeline.pairs.wishes import Wishes, with_wishes
     from semidense.pipeline.plan.errors import UsageError
     from semidense.pipeline.plan.presets import FOREIGN
 
@@ -88,7 +88,7 @@ def score(
     task = api.Task(spec, (), tuple(settings or ()), config_file(config), cache=cache, preset=FOREIGN)
     kinds = map_formats(formats)
     if dry_run:
-        plan = api.status(task.and_settings(wishes.settings), wishes.product)
+        plan = api.status(with_wishes(task, wishes), wishes.product)
         return console.show_plan(plan, api.open_store(cache), as_json)
     scored, about = _carry_out(task, wishes, output, kinds, workers, verbose - quiet)
     for warning in scored.warnings:
