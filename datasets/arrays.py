@@ -1,5 +1,6 @@
 """Name the kinds of array that scenes are made of, and refuse what is not of the kind."""
 
+from os import PathLike, fspath
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -25,6 +26,22 @@ def size_text(array: np.ndarray[Any, Any]) -> str:
 def array_text(array: np.ndarray[Any, Any]) -> str:
     """Return type and shape as a message says them."""
     return f"{array.dtype}, {' x '.join(map(str, array.shape)) or 'a scalar'}"
+
+
+def as_array(what: str, given: object) -> np.ndarray[Any, Any]:
+    """Return what a user gave as an array; a masked one keeps its mask.
+
+    Raises:
+        DatasetError: If it is None, a path, or nothing that NumPy takes.
+    """
+    if given is None:
+        raise DatasetError(f"{what} is None: was its file read?")
+    if isinstance(given, str | PathLike):
+        raise DatasetError(f"{what} is the path {fspath(given)!r} beside an array: give all as files, or all as arrays")
+    try:
+        return given if isinstance(given, np.ma.MaskedArray) else np.asarray(given)
+    except (ValueError, TypeError, RuntimeError) as error:  # torch raises the latter two
+        raise DatasetError(f"{what} is no array: {error}; give NumPy's") from error
 
 
 def check_image(what: str, image: ImageArray) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semidense.datasets.arrays import DisparityMap, ImageArray
+from semidense.datasets.arrays import DisparityMap, ImageArray, array_text, as_array
 from semidense.datasets.errors import DatasetError
 from semidense.datasets.formats.calibration.reading import read_cameras
 from semidense.datasets.pairs.images import harmonised
@@ -68,35 +68,39 @@ def array_pair(
         right: The right view, of the same height and width; None, if there is a disparity map, for none.
         options: What is known beside them.
         name: The scene's name.
-        disparity: (y, x) of any numbers: the left view's map by another matcher, read as ``options`` say.
+        disparity: (y, x) of any numbers: the left view's map by another matcher, read as ``options`` say. It may be
+            masked: a masked pixel has no disparity.
 
     Raises:
-        DatasetError: If an array is no image, or the two differ in size.
+        DatasetError: If an array is no image, or has masked pixels, or the two differ in size.
     """
+    one_view = right is None and disparity is not None
     first = _as_image("left image", left)
-    views = (first, np.zeros_like(first) if right is None else _as_image("right image", right))
+    views = (first, np.zeros_like(first) if one_view else _as_image("right image", right))
     Scene(name, *harmonised(*views), None, DisparityRange(0, 0))
     calib = tuple(Path(file) for file in options.calib)
     known = read_cameras(calib, options.unit) if calib else None
     size = (int(views[0].shape[0]), int(views[0].shape[1]))
-    pair = ArrayPair(**described(name, size, options, known), files={}, views=views, one_view=right is None)
+    pair = ArrayPair(**described(name, size, options, known), files={}, views=views, one_view=one_view)
     if disparity is None:
         return Dataset("pair", (pair,))
-    given = require_map("the disparity map", np.asarray(disparity))
+    given = require_map("the disparity map", as_array("the disparity map", disparity))
     return Dataset(
         "pair", (replace(read_once(pair, "the disparity map", given, options.scale, options.none), given=given),)
     )
 
 
 def _as_image(what: str, given: object) -> ImageArray:
-    array: NDArray[Any] = np.asarray(given)
+    array = as_array(what, given)
+    if np.ma.is_masked(array):
+        raise DatasetError(f"{what} has masked pixels, and an image has a value everywhere: give array.filled(0)")
+    array = np.asarray(array)
     bands = array.shape[2:]
     if bands in ((1,), (4,)):
         array = array[..., 0] if bands == (1,) else array[..., :3]
     if array.dtype.kind not in "ui" or array.shape[2:] not in ((), (3,)) or array.ndim < 2:
-        shape = " x ".join(map(str, array.shape)) or "a scalar"
         raise DatasetError(
-            f"{what} is {array.dtype}, {shape}; give uint8 or uint16, (rows, columns) or (rows, columns, 3)"
+            f"{what} is {array_text(array)}; give uint8 or uint16, (rows, columns) or (rows, columns, 3)"
             f"{_about_floats(array)}"
         )
     return _in_16_bits(what, np.ascontiguousarray(array))
@@ -105,8 +109,12 @@ def _as_image(what: str, given: object) -> ImageArray:
 def _about_floats(array: NDArray[Any]) -> str:
     if array.dtype.kind != "f" or array.size == 0:
         return ""
+    known = array[np.isfinite(array)]
+    if not known.size:
+        return "; all values are NaN or infinite: was it filled?"
+    others = f"{array.size - known.size} values are NaN or infinite: replace them; " if known.size < array.size else ""
     return (
-        f"; the values are {np.nanmin(array):g} to {np.nanmax(array):g}: scale both views alike, such as "
+        f"; {others}the values are {known.min():g} to {known.max():g}: scale both views alike, such as "
         "(view * 65535).astype(numpy.uint16) for 0 to 1"
     )
 
@@ -124,4 +132,5 @@ def _in_16_bits(what: str, array: NDArray[Any]) -> ImageArray:
 
 def _digest(view: NDArray[Any]) -> str:
     header = f"{view.dtype.str} {view.shape} ".encode()
-    return hashlib.sha256(header + np.ascontiguousarray(view).tobytes()).hexdigest()
+    mask = np.ma.getmaskarray(view).tobytes() if np.ma.is_masked(view) else b""
+    return hashlib.sha256(header + np.ascontiguousarray(view).tobytes() + mask).hexdigest()

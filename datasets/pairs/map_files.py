@@ -95,13 +95,14 @@ def disparities(what: str, stored: Stored, reading: Reading, signed: bool = True
 
     Args:
         what: Names them in messages.
-        stored: (y, x) of any numbers.
+        stored: (y, x) of any numbers; a masked one has no disparity.
         reading: Its scale is known by now.
         signed: Whether the sign of the scale was given, so that negative disparities are meant.
     """
     scale = reading.scale or 1.0
-    missing = _missing(stored, scale) if reading.none is None else stored == reading.none
-    values = np.where(missing | ~np.isfinite(stored), np.nan, stored.astype(np.float64) / scale).astype(np.float32)
+    known = ~np.ma.getmaskarray(stored)
+    values = np.full(stored.shape, np.nan, np.float32)
+    values[known] = _meant(np.ma.getdata(stored)[known], scale, reading.none)
     _require_possible(what, values)
     if not signed and np.nanmedian(values) < 0:
         raise DatasetError(
@@ -109,6 +110,12 @@ def disparities(what: str, stored: Stored, reading: Reading, signed: bool = True
             f"x - d: give scale={-scale:g} to turn the sign, scale={scale:g} to keep it"
         )
     return values
+
+
+def _meant(stored: Stored, scale: float, none: float | None) -> NDArray[np.float64]:
+    """Return the disparities that stored numbers stand for, px; NaN for none."""
+    missing = _missing(stored, scale) if none is None else stored == none
+    return np.where(missing | ~np.isfinite(stored), np.nan, stored.astype(np.float64) / scale)
 
 
 def _read_npy(path: Path) -> Stored:
@@ -131,13 +138,14 @@ _READERS: Mapping[str, Callable[[Path], Stored]] = {
 
 
 def recognised_scale(what: str, stored: Stored) -> float:
-    """Return the stored value of 1 px, if the type and the values leave no doubt.
+    """Return the stored value of 1 px, if the type and the values that are not masked leave no doubt.
 
     Raises:
         DatasetError: If they do.
     """
+    width, stored = stored.shape[1], np.ma.compressed(stored)
     if stored.dtype.kind == "f":
-        return _scale_of_floats(what, stored)
+        return _scale_of_floats(what, stored, width)
     if stored.dtype == np.int16:
         return _OPENCV
     if stored.dtype != np.uint16:
@@ -145,7 +153,7 @@ def recognised_scale(what: str, stored: Stored) -> float:
             f"{what}: {stored.dtype} says nothing of the scale; give the stored value of 1 px: scale=..."
         )
     largest = stored[~np.isin(stored, _WRAPPED)].max(initial=0)
-    low, high = (share * stored.shape[1] for share in (_LEAST_SHARE, _LARGEST_SHARE))
+    low, high = (share * width for share in (_LEAST_SHARE, _LARGEST_SHARE))
     if (stored == _WRAPPED[0]).any() and largest / _OPENCV <= high:
         return _OPENCV
     fitting = [scale for scale in (_KITTI, _OPENCV) if low <= largest / scale <= high]
@@ -157,12 +165,12 @@ def recognised_scale(what: str, stored: Stored) -> float:
     return fitting[0]
 
 
-def _scale_of_floats(what: str, stored: Stored) -> float:
+def _scale_of_floats(what: str, stored: Stored, width: int) -> float:
     largest = np.abs(stored[np.isfinite(stored)]).max(initial=0)
     if 0 < largest <= 1:
         raise DatasetError(
             f"{what}: the largest value is {largest:.3g}: are they shares of the width? give the stored value of 1 px: "
-            f"then scale={1 / stored.shape[1]:.3g}, else scale=1"
+            f"then scale={1 / width:.3g}, else scale=1"
         )
     return 1.0
 
@@ -175,7 +183,7 @@ def _missing(stored: Stored, scale: float) -> NDArray[np.bool_]:
         is_disparity = abs(scale) == _OPENCV and bool(wrapped.any())
         return wrapped if is_disparity else np.logical_or(wrapped, _equal(stored, 0))
     if stored.dtype.kind == "i":
-        return _equal(stored, min(stored.min(), -1))
+        return _equal(stored, stored.min(initial=-1))
     return _missing_of_floats(stored, scale)
 
 

@@ -2,11 +2,15 @@
 
 import csv
 import io
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from numbers import Real
+from os import PathLike, fspath
 from typing import Any, TypeAlias
 
 from semidense.datasets.errors import DatasetError
+from semidense.datasets.formats.calibration.cameras import require_unit
 
 SPLITS = ("side-by-side", "over-under")
 """How one picture may hold both views: left and right halves, or upper (left view) and lower (right view)."""
@@ -21,7 +25,7 @@ class PairOptions:
 
     Attributes:
         calib: Calibration files, one or a left and a right one; they replace those that a list names.
-        unit: Their unit of length.
+        unit: Their unit of length: mm, cm or m.
         d_min: Smallest disparity to search, pixels.
         d_max: Largest one.
         split: How one picture holds both views: one of `SPLITS`; None if each view has its own file.
@@ -29,10 +33,10 @@ class PairOptions:
             its first disparity is its coordinate ``d``, else ``d_min``, else 0.
         disparity: A file with a disparity map of the left view, which takes the place of the raw disparity.
         scale: Stored value of 1 px in that file; None: recognised.
-        none: Stored value of its pixels without a disparity; None: recognised.
+        none: Stored value of its pixels without a disparity; None: recognised. NaN and infinity mean None.
 
     Raises:
-        DatasetError: If ``split`` is not known.
+        DatasetError: If ``split`` or ``unit`` is not known, or a number is none.
     """
 
     calib: tuple[str, ...] = ()
@@ -48,6 +52,42 @@ class PairOptions:
     def __post_init__(self) -> None:
         if self.split is not None and self.split not in SPLITS:
             raise DatasetError(f"split={self.split}: not known; give {' or '.join(SPLITS)}")
+        require_unit(self.unit)
+        for key in ("d_min", "d_max"):
+            object.__setattr__(self, key, _pixels(key, getattr(self, key)))
+        for key in ("scale", "none"):
+            object.__setattr__(self, key, _stored(key, getattr(self, key)))
+        if self.none is not None and not math.isfinite(self.none):
+            object.__setattr__(self, "none", None)
+
+
+def _pixels(key: str, given: object) -> int | None:
+    if isinstance(given, Real) and not isinstance(given, bool) and float(given).is_integer():
+        return int(float(given))
+    if given is not None:
+        raise DatasetError(f"{key} = {given!r}: give a whole number of pixels")
+    return None
+
+
+def _stored(key: str, given: object) -> float | None:
+    if isinstance(given, Real) and not isinstance(given, bool):
+        return float(given)
+    if given is not None:
+        raise DatasetError(f"{key} = {given!r}: give a number")
+    return None
+
+
+def file_names(given: object) -> tuple[str, ...]:
+    """Return the names of the files that a user gave as one, several or, as None, none.
+
+    Raises:
+        DatasetError: If it is something else.
+    """
+    if given is None or isinstance(given, str | PathLike):
+        return () if given is None else (fspath(given),)
+    if isinstance(given, Sequence) and all(isinstance(each, str | PathLike) for each in given):
+        return tuple(map(fspath, given))
+    raise DatasetError(f"calib = {given!r}: give the path of a calibration file, or of several")
 
 
 _KEYS = tuple(field.name for field in fields(PairOptions))

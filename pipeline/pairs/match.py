@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from semidense.datasets import Calibration, Dataset, DisparityRange, SceneSource, open_dataset
 from semidense.datasets.pairs.arrays import array_pair
-from semidense.datasets.pairs.options import PairOptions, pair_spec
+from semidense.datasets.pairs.options import PairOptions, file_names, pair_spec
 from semidense.pipeline.api import Task, run, status
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import findings, without_texture
@@ -213,7 +213,7 @@ def match(
     *,
     d_min: int | None = None,
     d_max: int | None = None,
-    calib: str | PathLike[str] | Sequence[str | PathLike[str]] = (),
+    calib: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
     unit: Unit | None = None,
     settings: Settings = (),
     preset: str = OWN_PAIRS,
@@ -242,8 +242,7 @@ def match(
         UsageError, DatasetError, CacheError, StageError: what the user can mend, in one line.
     """
     refuse_unknown("match", wishes, _NAMED)
-    files = [calib] if isinstance(calib, str | PathLike) else calib
-    options = PairOptions(tuple(fspath(file) for file in files), unit, d_min, d_max)
+    options = PairOptions(file_names(calib), unit, d_min, d_max)
     dataset = _dataset(left, right, options)
     if (count := len(dataset.scenes)) != 1:
         raise UsageError(f"{left} and {right} are {count} pairs; match one at a time, or use `pipeline match`")

@@ -7,6 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from semidense.datasets.arrays import as_array
 from semidense.pipeline.api import Task
 from semidense.pipeline.pairs.match import match
 from semidense.pipeline.pairs.wishes import Wishes, refuse_unknown, wished
@@ -96,7 +97,8 @@ class StereoMatcher:
         Raises:
             DatasetError: if an array is no image, or the two do not fit together.
         """
-        found = match(_rgb(left), _rgb(right), d_min=self._range[0], d_max=self._range[-1], **self._how)
+        views = _rgb("left image", left), _rgb("right image", right)
+        found = match(*views, d_min=self._range[0], d_max=self._range[-1], **self._how)
         self._confidence = found.confidence
         return found.disparity
 
@@ -142,6 +144,7 @@ def _refuse_unknown(wishes: Mapping[str, object]) -> None:
     refuse_unknown("StereoMatcher", wishes, _NAMED)
 
 
-def _rgb(view: NDArray[Any]) -> NDArray[Any]:
+def _rgb(what: str, given: object) -> NDArray[Any]:
     """Return OpenCV's blue, green, red (and alpha) as red, green, blue; anything else as it is."""
-    return view[..., 2::-1] if np.shape(view)[2:] in ((3,), (4,)) else view
+    view = as_array(what, given)
+    return view[..., 2::-1] if view.shape[2:] in ((3,), (4,)) else view

@@ -11,7 +11,7 @@ import numpy as np
 
 from semidense.datasets import Dataset, DisparityRange, open_dataset
 from semidense.datasets.pairs.arrays import array_pair
-from semidense.datasets.pairs.options import PairOptions, pair_spec
+from semidense.datasets.pairs.options import PairOptions, file_names, pair_spec
 from semidense.pipeline.api import Task, run
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import same_picture
@@ -67,7 +67,7 @@ def score(
     *,
     scale: float | None = None,
     none: float | None = None,
-    calib: str | PathLike[str] | Sequence[str | PathLike[str]] = (),
+    calib: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
     unit: Unit | None = None,
     settings: Settings = (),
     cache: Path | str | None = None,
@@ -96,8 +96,9 @@ def score(
     """
     if beyond := [name for name in wishes if name not in _WISHES]:
         raise UsageError(f"score takes no {beyond[0]}; it takes {', '.join(_WISHES)}, one of them")
-    files = [calib] if isinstance(calib, str | PathLike) else calib
-    options = PairOptions(tuple(fspath(file) for file in files), unit, scale=scale, none=none)
+    if disparity is None:
+        raise UsageError("the disparity map is None: was its file read?")
+    options = PairOptions(file_names(calib), unit, scale=scale, none=none)
     dataset = _dataset(left, disparity, right, options)
     task = Task(dataset, settings=settings, cache=cache, preset=FOREIGN)
     return score_one(task, Wishes(**wishes), watch=watch, workers=workers)

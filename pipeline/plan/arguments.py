@@ -2,6 +2,7 @@
 
 import math
 from numbers import Integral, Real
+from typing import cast
 
 import numpy as np
 
@@ -20,12 +21,12 @@ def texts(what: str, given: object) -> tuple[str, ...]:
     if given is None or isinstance(given, str):
         return () if given is None else (given,)
     try:
-        found = tuple(given)  # type: ignore[arg-type]
+        found: tuple[object, ...] = tuple(given)  # type: ignore[arg-type]
     except TypeError:
         found = (None,)
     if not all(isinstance(each, str) for each in found):
         raise UsageError(f"{what} = {shortened(given)}: give a text, or a list of texts")
-    return found
+    return cast(tuple[str, ...], found)
 
 
 def require_number(what: str, given: object) -> float:
@@ -35,7 +36,7 @@ def require_number(what: str, given: object) -> float:
         UsageError: if it is none: a text, NaN, or True and False.
     """
     if isinstance(given, Real) and not isinstance(given, bool) and not math.isnan(given):
-        return given  # type: ignore[return-value]
+        return cast(float, given)
     raise UsageError(f"{what} = {shortened(given)}: give a number")
 
 

@@ -117,6 +117,12 @@ class PairCalibration:
         )
 
 
+def require_unit(unit: object) -> None:
+    """Refuse a unit of length that a user gave and that is not known: CalibrationError."""
+    if unit not in (None, *MILLIMETRES):
+        raise CalibrationError(f"unit {unit!r} of a calibration; give {', '.join(MILLIMETRES)}")
+
+
 def calibrated(cameras: Cameras, unit: str | None = None) -> PairCalibration:
     """Return what depth needs.
 

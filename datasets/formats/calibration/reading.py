@@ -7,10 +7,10 @@ from typing import Any
 
 from semidense.datasets.errors import CalibrationError
 from semidense.datasets.formats.calibration.cameras import (
-    MILLIMETRES,
     Cameras,
     PairCalibration,
     calibrated,
+    require_unit,
     unknown_format,
 )
 from semidense.datasets.formats.calibration.ini import ini_values, is_ini
@@ -36,8 +36,7 @@ def read_cameras(files: Sequence[Path], unit: str | None = None, folder: str | N
         MissingFileError: If there is no such file.
         CalibrationError: If a file is not valid, no unit is known, or the cameras are no rectified pair side by side.
     """
-    if unit is not None and unit not in MILLIMETRES:
-        raise CalibrationError(f"unit {unit!r} of a calibration; give {', '.join(MILLIMETRES)}")
+    require_unit(unit)
     if len(files) not in (1, 2):
         raise CalibrationError(f"{len(files)} calibration files; give one, or a left and a right one")
     texts = [read_text(path) for path in files]

@@ -9,6 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import torch
 
 from semidense import pipeline
 from semidense.datasets import DatasetError, read_image
@@ -107,3 +108,16 @@ def test_a_matcher_is_copied_with_its_confidence(given: list[Any], again: Callab
     assert same.confidence.tolist() == [[0.5]]
     assert same.compute(view, view).shape == (1, 1)
     assert len(given) == 4
+
+
+@pytest.mark.parametrize("kind", [np.ndarray.tolist, torch.from_numpy], ids=["lists", "torch"])
+def test_lists_and_tensors_have_opencvs_bands_too(given: list[Any], kind: Callable[..., Any]) -> None:
+    view = np.arange(60, dtype=np.uint8).reshape(4, 5, 3)
+    pipeline.StereoMatcher().compute(kind(view), kind(view))
+    assert given[0].tolist() == view[..., ::-1].tolist()
+
+
+@pytest.mark.parametrize(("view", "message"), [(None, "was its file read"), ("left.png", "is the path")])
+def test_what_is_no_array_is_told(view: Any, message: str) -> None:  # noqa: ANN401
+    with pytest.raises(DatasetError, match=message):
+        pipeline.StereoMatcher().compute(view, view)

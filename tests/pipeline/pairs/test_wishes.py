@@ -37,7 +37,7 @@ def test_without_a_tolerance_that_of_the_settings_holds() -> None:
 
 
 @pytest.mark.parametrize("instead", ["density", "max_error"])
-def test_an_R_that_the_settings_replace_is_refused(instead: str) -> None:
+def test_a_threshold_that_the_settings_replace_is_refused(instead: str) -> None:
     task = Task(settings={f"semidense.{instead}": 0.5})
     with pytest.raises(UsageError, match=r"^R = 0\.2 says how much to keep, and so does .*; give one of them$"):
         with_wishes(task, Wishes(R=0.2))
