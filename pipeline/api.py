@@ -14,6 +14,7 @@ from semidense.datasets.formats.files import user_path
 from semidense.pipeline.execution.retry import attempt
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.execution.watch import Unwatched, Watch
+from semidense.pipeline.plan.arguments import Texts, require_path, require_workers, texts
 from semidense.pipeline.plan.config import Config, Settings, setting_texts
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made, Plan, Planned, close_ranges, make_plan
@@ -22,17 +23,26 @@ from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.plan.training_split import training_scenes
 from semidense.pipeline.results.metric_rows import METHOD
 from semidense.pipeline.results.result import Result
-from semidense.pipeline.variants import variants_of
+from semidense.pipeline.variants import Swept, Thresholds, variants_of
 from semidense.stages.evaluation.filtering import SemidenseParams
 
 CACHE_VARIABLE = "PIPELINE_CACHE"
 _INSTEAD_OF_R = ("semidense.density", "semidense.max_error")
+Cache = Path | str | Store | None
+"""Where results are kept: a folder, a URL, or an opened cache; None for the default of ``open_store``."""
 
 
-def open_store(folder: Path | str | None = None) -> Store:
-    """Return the cache in ``folder``, or at a URL; by default in ``$PIPELINE_CACHE`` or the user's cache folder."""
+def open_store(folder: Cache = None) -> Store:
+    """Return the cache in ``folder``, or at a URL; by default in ``$PIPELINE_CACHE`` or the user's cache folder.
+
+    Raises:
+        UsageError: if ``folder`` is no path, URL or opened cache.
+    """
     from platformdirs import user_cache_path
 
+    if isinstance(folder, Store):
+        return folder
+    require_path("cache", folder, "a folder, a URL, or what open_store returns")
     chosen = str(folder or os.environ.get(CACHE_VARIABLE) or user_cache_path("semidense-stereo", appauthor=False))
     return Store(chosen if "://" in chosen else user_path(chosen))
 
@@ -44,11 +54,11 @@ Data = str | Path | Dataset
 class Options(TypedDict, total=False):
     """What all verbs share, by name; ``Task`` says what each is."""
 
-    scenes: Sequence[str]
+    scenes: Texts
     settings: Settings
     config: Path | str | None
     train: bool
-    cache: Path | str | None
+    cache: Cache
     preset: str
 
 
@@ -64,27 +74,36 @@ class Task:
             defaults; kept as the latter.
         config: a TOML file.
         train: train the networks on the training scenes instead of taking the shipped weights.
-        cache: the cache's folder.
+        cache: the cache's folder or URL, or an opened cache.
         preset: named settings to start from, ``paper`` or ``robust``; the file's and ``settings`` refine them.
+
+    Raises:
+        UsageError: if ``scenes``, ``settings`` or ``config`` is of another kind.
     """
 
     dataset: Data = "motorcycle"
-    scenes: Sequence[str] = ()
+    scenes: Texts = ()
     settings: Settings = ()
     config: Path | str | None = None
     train: bool = False
-    cache: Path | str | None = None
+    cache: Cache = None
     preset: str = DEFAULT
 
     def __post_init__(self) -> None:
         """Bring what may be typed in several ways into one form."""
         object.__setattr__(self, "settings", setting_texts(self.settings))
-        object.__setattr__(self, "scenes", (self.scenes,) if isinstance(self.scenes, str) else tuple(self.scenes))
+        object.__setattr__(self, "scenes", texts("scenes", self.scenes))
+        require_path("config", self.config, "a TOML file; settings takes single settings")
 
     @classmethod
     def of(cls, dataset: "Data | Task", **options: Unpack[Options]) -> "Task":
         """Return the task that a verb's arguments describe; options refine one that is given."""
         return replace(dataset, **options) if isinstance(dataset, Task) else cls(dataset, **options)
+
+    @property
+    def spec(self) -> str:
+        """The dataset as it was named."""
+        return self.dataset.spec if isinstance(self.dataset, Dataset) else str(self.dataset)
 
     def and_settings(self, further: Settings) -> "Task":
         """Return the task with further settings, which win."""
@@ -108,7 +127,7 @@ class Task:
         return whole.select(self.scenes) if self.scenes else whole
 
     def _whole(self) -> Dataset:
-        return self.dataset if isinstance(self.dataset, Dataset) else open_dataset(str(self.dataset))
+        return self.dataset if isinstance(self.dataset, Dataset) else open_dataset(self.spec)
 
     def request(self, upto: str, variants: Iterable[Sequence[str]] = ((),)) -> Request:
         """Return the request for products up to ``upto``, in one variant for each list of further settings.
@@ -133,7 +152,7 @@ def status(
     dataset: Data | Task = "motorcycle",
     upto: str = "metrics",
     *,
-    forced: Sequence[str] = (),
+    forced: Texts = (),
     **options: Unpack[Options],
 ) -> Plan:
     """Return the plan of a run: every step with its state. Nothing is made or changed."""
@@ -141,10 +160,10 @@ def status(
     return planned(task, task.request(upto), forced)
 
 
-def planned(task: Task, request: Request, forced: Sequence[str] = ()) -> Plan:
+def planned(task: Task, request: Request, forced: Texts = ()) -> Plan:
     """Return the plan of a request: every step with its state. Nothing is made or changed."""
     store = open_store(task.cache)
-    return _plan(close_ranges(request, store), store, forced)
+    return _plan(close_ranges(request, store), store, texts("forced", forced))
 
 
 def _plan(request: Request, store: Store, forced: Iterable[str]) -> Plan:
@@ -160,7 +179,7 @@ def run(
     dataset: Data | Task = "motorcycle",
     upto: str = "metrics",
     *,
-    forced: Sequence[str] = (),
+    forced: Texts = (),
     watch: Watch | None = None,
     scheduler: str | None = None,
     workers: int | None = None,
@@ -189,12 +208,14 @@ def run(
 def carry_out(
     task: Task,
     request: Request,
-    forced: Sequence[str],
+    forced: Texts,
     watch: Watch | None,
     scheduler: str | None,
     workers: int | None,
 ) -> Result:
     """Make what a request asks for; see ``run``."""
+    require_workers(workers)
+    again = texts("forced", forced)
     store = open_store(task.cache)
     extras = provenance(sys.argv)
 
@@ -202,7 +223,7 @@ def carry_out(
         plan_again = functools.partial(_plan, wanted, store, forced)
         return attempt(plan_again, store, watch or Unwatched(), extras, scheduler, workers)
 
-    plan, made = make(close_ranges(request, store, lambda wanted: make(wanted)[1]), forced)
+    plan, made = make(close_ranges(request, store, lambda wanted: make(wanted)[1]), again)
     return Result(plan, made, store, list(_metric_rows(plan, store, made)), task.preset)
 
 
@@ -220,8 +241,8 @@ def _metric_rows(plan: Plan, store: Store, made: Mapping[str, Made]) -> Iterator
 
 def sweep(
     dataset: Data | Task = "motorcycle",
-    R: str | float | Sequence[float] = "0.05:0.95:0.05",
-    over: Mapping[str, object] | Sequence[str] = (),
+    R: Thresholds = "0.05:0.95:0.05",
+    over: Swept = (),
     *,
     watch: Watch | None = None,
     scheduler: str | None = None,
@@ -246,7 +267,7 @@ def sweep(
     return carry_out(task, sweep_request(task, R, over), (), watch, scheduler, workers)
 
 
-def sweep_request(task: Task, R: str | float | Sequence[float], over: Mapping[str, object] | Sequence[str]) -> Request:
+def sweep_request(task: Task, R: Thresholds, over: Swept) -> Request:
     """Return the request of a sweep; see ``sweep``."""
     variants = variants_of(R, over)
     swept = {setting.partition("=")[0] for variant in variants for setting in variant}
@@ -271,5 +292,5 @@ def explain(dataset: Data | Task, product: str, scene: str | None = None, **opti
         raise UsageError(f"no {product} yet: {plan.notes[0]}")
     if len(found) != 1:
         names = ", ".join(each.step.scene for each in asked) or "none"
-        raise UsageError(f"{product} of {scene or task.dataset}: {len(found)} scenes fit ({names}); name one")
+        raise UsageError(f"{product} of {scene or task.spec}: {len(found)} scenes fit ({names}); name one")
     return found[0]

@@ -1,18 +1,25 @@
 """What a sweep tries: thresholds R, and values of settings, in all combinations."""
 
 import itertools
-from collections.abc import Mapping, Sequence
-from numbers import Real
+from collections.abc import Iterable, Mapping
 
+import numpy as np
+
+from semidense.pipeline.plan.arguments import require_number, texts
 from semidense.pipeline.plan.config import alternatives, value_text
 from semidense.pipeline.plan.errors import UsageError, shortened
 
+Thresholds = str | float | Iterable[float]
+"""What R may be: a number, several, or a text of them."""
+Swept = Mapping[str, object] | Iterable[str] | str | None
+"""What is swept beside R: ``{"section.field": [value1, value2]}``, or ``section.field=value1,value2`` once or more."""
 
-def variants_of(R: str | float | Sequence[float], over: Mapping[str, object] | Sequence[str]) -> list[tuple[str, ...]]:
+
+def variants_of(R: Thresholds, over: Swept) -> list[tuple[str, ...]]:
     """Return the settings of each variant, as texts: a threshold, and a value of each setting that is swept.
 
     Raises:
-        UsageError: if a threshold is none, or R is swept in two ways.
+        UsageError: if a threshold is none, R is swept in two ways, or a setting has no value to try.
 
     >>> variants_of("0.1,0.2", {"channels.rank_window": 15})
     [('semidense.R=0.1', 'channels.rank_window=15'), ('semidense.R=0.2', 'channels.rank_window=15')]
@@ -23,19 +30,24 @@ def variants_of(R: str | float | Sequence[float], over: Mapping[str, object] | S
     return [(threshold, *combination) for combination in itertools.product(*combined) for threshold in thresholds]
 
 
-def _combined(over: Mapping[str, object] | Sequence[str]) -> list[list[str]]:
+def _combined(over: Swept) -> list[list[str]]:
     """Return each swept setting as one text a value."""
     if isinstance(over, Mapping):
-        return [[f"{name}={value_text(name, value)}" for value in _several(values)] for name, values in over.items()]
-    return [alternatives(setting) for setting in over]
+        return [
+            [f"{name}={value_text(name, value)}" for value in _several(name, values)] for name, values in over.items()
+        ]
+    return [alternatives(setting) for setting in texts("over", over)]
 
 
-def _several(values: object) -> Sequence[object]:
+def _several(name: str, values: object) -> list[object]:
     """Return the values of a setting that is swept; one that stands alone, as one."""
-    return values if isinstance(values, Sequence) and not isinstance(values, str) else [values]
+    found: list[object] = list(values) if np.iterable(values) and not isinstance(values, str) else [values]
+    if not found:
+        raise UsageError(f"{name} has no value to try; give at least one")
+    return found
 
 
-def parse_thresholds(R: str | float | Sequence[float]) -> list[float]:
+def parse_thresholds(R: Thresholds) -> list[float]:
     """Return the thresholds that ``first:last:step``, ``value,value``, a number or a sequence names.
 
     Raises:
@@ -45,9 +57,8 @@ def parse_thresholds(R: str | float | Sequence[float]) -> list[float]:
     [0.1, 0.2, 0.3]
     """
     try:
-        R = [float(R)] if isinstance(R, int | float | Real) else R
         values = _span(R) if isinstance(R, str) and ":" in R else _list(R)
-    except ValueError:
+    except (TypeError, ValueError):
         raise UsageError(f"R = {shortened(R)}: write a number, numbers with commas, or first:last:step") from None
     outside = [value for value in values if not 0 <= value <= 1]
     if outside or not values:
@@ -64,5 +75,6 @@ def _span(text: str) -> list[float]:
     return [round(first + index * step, 10) for index in range(int((last - first) / step + 1e-9) + 1)]
 
 
-def _list(R: str | Sequence[float]) -> list[float]:
-    return [float(part) for part in (R.split(",") if isinstance(R, str) else R)]
+def _list(R: Thresholds) -> list[float]:
+    parts = R.split(",") if isinstance(R, str) else R if np.iterable(R) else [R]
+    return [float(part if isinstance(part, str) else require_number("R", part)) for part in parts]

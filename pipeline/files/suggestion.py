@@ -1,10 +1,11 @@
 """Write the command that makes what is missing."""
 
 import shlex
-from pathlib import Path
 
-from semidense.datasets import Dataset
+from semidense.cache import Store
 from semidense.pipeline.api import Task
+from semidense.pipeline.plan.arguments import texts
+from semidense.pipeline.plan.config import setting_texts
 from semidense.pipeline.plan.presets import DEFAULT
 
 
@@ -14,11 +15,12 @@ def run_command(task: Task, upto: str = "metrics") -> str:
     >>> run_command(Task("middlebury:my scenes", settings=["costvolume.mode=fast"]), "disparity")
     "pipeline run 'middlebury:my scenes' --set costvolume.mode=fast --upto disparity"
     """
-    words = ["pipeline", "run", task.dataset.spec if isinstance(task.dataset, Dataset) else str(task.dataset)]
-    for name, values in (("--scene", task.scenes), ("--set", task.settings)):
-        words += [word for value in values for word in (name, str(value))]
+    words = ["pipeline", "run", task.spec]
+    for option, values in (("--scene", texts("scenes", task.scenes)), ("--set", setting_texts(task.settings))):
+        words += [word for value in values for word in (option, value)]
     words += ["--preset", task.preset] if task.preset != DEFAULT else []
-    for option, path in (("--config", task.config), ("--cache", task.cache)):
-        words += [option, str(Path(path))] if path else []
+    cache = task.cache.root if isinstance(task.cache, Store) else task.cache
+    for option, path in (("--config", task.config), ("--cache", cache)):
+        words += [option, str(path)] if path else []
     words += ["--train"] if task.train else []
     return shlex.join([*words, *(["--upto", upto] if upto != "metrics" else [])])

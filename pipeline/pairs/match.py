@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
 from os import PathLike, fspath
-from pathlib import Path
 from threading import Thread
 from typing import Any, Literal
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from semidense.datasets import Calibration, Dataset, DisparityRange, SceneSource, open_dataset
 from semidense.datasets.pairs.arrays import array_pair
 from semidense.datasets.pairs.options import PairOptions, file_names, pair_spec
-from semidense.pipeline.api import Task, run, status
+from semidense.pipeline.api import Cache, Task, run, status
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import findings, without_texture
 from semidense.pipeline.pairs.wishes import Wishes, refuse_unknown, wished
@@ -217,7 +216,7 @@ def match(
     unit: Unit | None = None,
     settings: Settings = (),
     preset: str = OWN_PAIRS,
-    cache: Path | str | None = None,
+    cache: Cache = None,
     watch: Watch | None = None,
     workers: int | None = None,
     **wishes: Any,  # noqa: ANN401 - those of Wishes
@@ -233,7 +232,7 @@ def match(
         unit: of a calibration that does not tell it, such as OpenCV's.
         settings: settings of the configuration, over those of the preset.
         preset: named settings to start from: ``robust``, or ``paper`` for the method of the paper.
-        cache: the cache's folder.
+        cache: the cache's folder or URL, or an opened cache.
         watch: told how it goes on.
         workers: threads; None for one a core.
         **wishes: the attributes of `Wishes`, such as ``R=0.8``, ``density=0.8`` or ``subpixel=True``.

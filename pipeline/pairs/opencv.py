@@ -1,14 +1,13 @@
 """A replacement for OpenCV's ``StereoSGBM`` with the same calls."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semidense.datasets.arrays import as_array
-from semidense.pipeline.api import Task
+from semidense.pipeline.api import Cache, Task, open_store
 from semidense.pipeline.pairs.match import match
 from semidense.pipeline.pairs.wishes import Wishes, refuse_unknown, wished
 from semidense.pipeline.plan.arguments import require_number
@@ -45,7 +44,7 @@ class StereoMatcher:
         disp12MaxDiff: float = -1,
         settings: Settings = (),
         preset: str = OWN_PAIRS,
-        cache: Path | str | None = None,
+        cache: Cache = None,
         **wishes: Any,  # noqa: ANN401 - those of Wishes
     ) -> None:
         """Set what to search and what to keep. All of it is checked here, before any image is there.
@@ -56,7 +55,7 @@ class StereoMatcher:
             disp12MaxDiff: drop disparities that the right view's map contradicts by more than this, px; below 0: none.
             settings: ``section.field=value`` of the configuration, over those of the preset.
             preset: named settings to start from: ``robust``, or ``paper`` for the method of the paper.
-            cache: the cache's folder.
+            cache: the cache's folder or URL, or an opened cache.
             **wishes: attributes of ``semidense.pipeline.pairs.match.Wishes``, such as ``R=0.8``, ``density=0.5`` or
                 ``subpixel=True``.
 
@@ -72,6 +71,7 @@ class StereoMatcher:
             if "tolerance" in wishes:
                 raise UsageError("disp12MaxDiff and tolerance both say what the right view's map drops; give one")
             wishes |= {"left_right": True, "tolerance": float(disp12MaxDiff)}
+        open_store(cache)
         wished(Task(settings=settings, preset=preset), Wishes(**wishes))
         self._range = range(low, low + count)
         self._how: dict[str, Any] = {

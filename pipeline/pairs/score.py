@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from os import PathLike, fspath
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from semidense.datasets import Dataset, DisparityRange, open_dataset
 from semidense.datasets.pairs.arrays import array_pair
 from semidense.datasets.pairs.options import PairOptions, file_names, pair_spec
-from semidense.pipeline.api import Task, run
+from semidense.pipeline.api import Cache, Task, run
 from semidense.pipeline.execution.watch import Watch
 from semidense.pipeline.pairs.findings import same_picture
 from semidense.pipeline.pairs.match import Match, Unit
@@ -70,7 +69,7 @@ def score(
     calib: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
     unit: Unit | None = None,
     settings: Settings = (),
-    cache: Path | str | None = None,
+    cache: Cache = None,
     watch: Watch | None = None,
     workers: int | None = None,
     **wishes: Any,  # noqa: ANN401 - those of Wishes
@@ -86,7 +85,7 @@ def score(
         calib: a calibration file, for depth and points.
         unit: of a calibration that does not tell it.
         settings: settings of the configuration, over those of the preset ``foreign``.
-        cache: the cache's folder.
+        cache: the cache's folder or URL, or an opened cache.
         watch: told how it goes on.
         workers: threads; None for one a core.
         **wishes: ``R``, ``density`` or ``max_error``; see `Wishes`, whose other attributes are for `match` alone.

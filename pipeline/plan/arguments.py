@@ -1,12 +1,17 @@
 """Bring what a caller gives in several ways into one form, or refuse it in one line."""
 
 import math
+import os
+from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import cast
 
 import numpy as np
 
 from semidense.pipeline.plan.errors import UsageError, shortened
+
+Texts = Iterable[str] | str | None
+"""What ``texts`` takes: one text, several, or none."""
 
 
 def texts(what: str, given: object) -> tuple[str, ...]:
@@ -44,6 +49,12 @@ def require_flag(what: str, given: object) -> None:
     """Refuse what is neither True nor False: UsageError."""
     if not isinstance(given, bool | np.bool_):
         raise UsageError(f"{what} = {shortened(given)}: give True or False")
+
+
+def require_path(what: str, given: object, wanted: str) -> None:
+    """Refuse what is neither a path nor None: UsageError, which names what is ``wanted``."""
+    if given is not None and not isinstance(given, str | os.PathLike):
+        raise UsageError(f"{what} = {shortened(given)}: give {wanted}")
 
 
 def require_workers(given: object) -> None:

@@ -17,13 +17,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from semidense.datasets import DatasetError
 from semidense.datasets.formats.files import read_text
 from semidense.pipeline.plan import presets
+from semidense.pipeline.plan.arguments import texts
 from semidense.pipeline.plan.errors import UsageError, nearest, shortened
 from semidense.stages.catalog import STAGES
 from semidense.stages.stage import NoParams, Params
 
 P = TypeVar("P", bound=Params)
-Settings = Mapping[str, object] | Iterable[str] | str
-"""Settings as people type them: ``{"semidense.R": 0.8}``, ``"semidense.R=0.8"`` or several of the latter."""
+Settings = Mapping[str, object] | Iterable[str] | str | None
+"""Settings as people type them: ``{"semidense.R": 0.8}``, ``"semidense.R=0.8"``, several of the latter, or none."""
 _VALUE = re.compile(r'(?:\[[^\]]*\]|"[^"]*"|[^,])+')
 """One of several values."""
 CHOICES = ("weights", "use")
@@ -174,12 +175,10 @@ def setting_texts(settings: Settings) -> tuple[str, ...]:
     ('semidense.R=0.8',)
 
     Raises:
-        UsageError: if a value is none that a configuration can hold.
+        UsageError: if they have another form, or a value is none that a configuration can hold.
     """
-    if isinstance(settings, str):
-        return (settings,)
     if not isinstance(settings, Mapping):
-        return tuple(settings)
+        return texts("settings", settings)
     return tuple(f"{name}={value_text(name, value)}" for name, value in settings.items())
 
 
@@ -192,7 +191,9 @@ def value_text(name: str, value: object) -> str:
     try:
         return json.dumps(value, default=_plain)
     except (TypeError, ValueError):
-        raise UsageError(f"setting {name} = {value!r}: give a number, a text, true, false or a list of them") from None
+        raise UsageError(
+            f"setting {name} = {shortened(value)}: give a number, a text, true, false or a list of them"
+        ) from None
 
 
 def _plain(value: object) -> object:
@@ -223,7 +224,7 @@ def preset_settings(preset: str) -> tuple[str, ...]:
     Raises:
         UsageError: if there is no preset of that name.
     """
-    if preset not in presets.PRESETS:
+    if not isinstance(preset, str) or preset not in presets.PRESETS:
         raise UsageError(f"no preset {preset!r}; {nearest(preset, presets.PRESETS)}")
     return presets.PRESETS[preset]
 

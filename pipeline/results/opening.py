@@ -5,10 +5,14 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from semidense.cache import Store
+from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.metric_rows import FIGURES
 
 if TYPE_CHECKING:
     import xarray as xr
+
+_PLAIN = ("key", "digest", "stage", "created", "seconds")
+"""Attributes of an opened product that are no JSON."""
 
 
 def open_product(store: Store, key: str) -> "xr.Dataset":
@@ -45,10 +49,15 @@ def _attribute(value: object) -> str | float:
 def recorded(dataset: "xr.Dataset", part: str) -> dict[str, Any]:
     """Return a part of what an opened product's attributes say, such as ``params``; empty if they do not say it.
 
+    Raises:
+        UsageError: if the part is a plain text or number, which ``attrs`` itself gives.
+
     >>> import xarray as xr
     >>> recorded(xr.Dataset(attrs={"params": '{"R": 0.9}'}), "params")
     {'R': 0.9}
     """
+    if part in _PLAIN:
+        raise UsageError(f"{part} is no JSON text; read it as dataset.attrs[{part!r}]")
     found: dict[str, Any] = json.loads(dataset.attrs.get(part, "{}"))
     return found
 

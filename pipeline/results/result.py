@@ -1,6 +1,6 @@
 """What a run made or found."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semidense.cache import Store
-from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.errors import UsageError, nearest
 from semidense.pipeline.plan.images_and_truth import MASK_KINDS
 from semidense.pipeline.plan.plan import Made, Plan
 from semidense.pipeline.plan.presets import DEFAULT
@@ -43,17 +43,19 @@ class Result:
         """Return the result of a product; of a scene, if there are several.
 
         Raises:
-            UsageError: if there is none, or several fit.
+            UsageError: if there is none (the nearest is named), or several fit.
         """
-        found = [
-            made
-            for made in self.made.values()
-            if made.step.product == product and scene in (None, made.step.scene, made.step.scene.rsplit("/", 1)[-1])
-        ]
+        of_product = [made for made in self.made.values() if made.step.product == product]
+        if not of_product:
+            products = dict.fromkeys(made.step.product for made in self.made.values())
+            raise UsageError(f"no {product} was made; {nearest(product, products)}")
+        found = [made for made in of_product if scene in (None, made.step.scene, made.step.scene.rsplit("/", 1)[-1])]
+        if not found:
+            raise UsageError(f"{product} was not made of {scene}; {nearest(scene, _scenes(of_product))}")
         if len(found) != 1:
-            names = sorted({made.step.scene for made in found})
+            names = _scenes(found)
             way = "name a scene" if len(names) > 1 else "they are of several variants, which ``made`` holds"
-            told = f"{len(found)} results fit ({', '.join(names) or 'none'})"
+            told = f"{len(found)} results fit ({', '.join(names)})"
             raise UsageError(f"{product} of {scene or 'the only scene'}: {told}; {way}")
         return found[0]
 
@@ -89,6 +91,10 @@ class Result:
             made.step.scene: MASK_KINDS[int(np.asarray(self.store.arrays(made.key)["mask_kind"][...])[0])]
             for made in truths
         }
+
+
+def _scenes(made: Iterable[Made]) -> list[str]:
+    return sorted({each.step.scene for each in made})
 
 
 def _cell(value: object) -> str:

@@ -2,10 +2,12 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from semidense.cache import Store
 from semidense.pipeline import api
 from semidense.pipeline.api import Task, open_store, sweep_request
 from semidense.pipeline.cli.options import chosen_preset
@@ -31,6 +33,8 @@ MakePair = Callable[[Path], Path]
         pytest.param("0.9", [0.9], id="one"),
         pytest.param("0.9,0.1", [0.9, 0.1], id="as they come"),
         pytest.param([0.2, 0.4], [0.2, 0.4], id="a sequence"),
+        pytest.param(np.array([0.25, 0.5]), [0.25, 0.5], id="an array"),
+        pytest.param((share / 4 for share in (1, 2)), [0.25, 0.5], id="a generator"),
     ],
 )
 def test_thresholds_are_read(text: str, values: list[float]) -> None:
@@ -105,11 +109,16 @@ def test_a_value_that_stands_alone_is_swept_as_one() -> None:
         "0:inf:0.1",
         "nan:1:0.1",
         [],
+        None,
+        True,
+        [None],
+        [[0.1, 0.2], [0.3, 0.4]],
+        np.full((2, 2), 0.5),
     ],
 )
-def test_other_thresholds_are_refused_in_one_line(text: str) -> None:
+def test_other_thresholds_are_refused_in_one_line(text: object) -> None:
     with pytest.raises(UsageError, match=r"^R = ") as caught:
-        parse_thresholds(text)
+        parse_thresholds(text)  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)
 
 
@@ -128,6 +137,56 @@ def test_the_cache_is_where_one_says_then_where_the_environment_says(
 def test_a_home_is_expanded(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
     assert open_store("~/c").root == tmp_path / "c"
+
+
+def test_an_opened_cache_is_taken_as_it_is(tmp_path: Path) -> None:
+    store = Store(tmp_path, "size")
+    assert open_store(store) is store
+    assert api.run(TEST_ONLY, "images", cache=store).store is store
+
+
+@pytest.mark.parametrize("cache", [3, b"cache", ["cache"], Task()], ids=repr)
+def test_what_names_no_cache_makes_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cache: Any) -> None:  # noqa: ANN401
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UsageError, match=r"^cache = .*: give a folder, a URL, or"):
+        api.run(TEST_ONLY, "images", cache=cache)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        pytest.param({"settings": 3}, "settings = 3: give a text", id="a number as settings"),
+        pytest.param({"settings": [("semidense.R", 0.8)]}, r"settings = \[\(.*: give a text", id="pairs as settings"),
+        pytest.param({"settings": b"semidense.R=1"}, "settings = b'.*: give a text", id="bytes as settings"),
+        pytest.param({"scenes": 3}, "scenes = 3: give a text", id="a number as scenes"),
+        pytest.param({"scenes": [3]}, r"scenes = \[3\]: give a text", id="numbers as scenes"),
+        pytest.param({"config": {"semidense": {}}}, "config = .*: give a TOML file", id="a mapping as a file"),
+        pytest.param({"preset": None}, "no preset None; there are paper", id="no preset"),
+        pytest.param({"preset": ["paper"]}, "no preset .'paper'.", id="several presets"),
+        pytest.param({"upto": None}, "no product None", id="no product"),
+        pytest.param({"upto": ["disparity"]}, "no product .'disparity'.", id="several products"),
+        pytest.param({"forced": 3}, "forced = 3: give a text", id="a number as a product"),
+        pytest.param({"workers": 0}, "workers = 0: give a whole number from 1", id="no worker"),
+    ],
+)
+def test_arguments_of_another_kind_are_refused_in_one_line(
+    tmp_path: Path, options: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(UsageError, match=message):
+        api.run(TEST_ONLY, **{"upto": "images", "cache": tmp_path / "cache"} | options)
+    assert not (tmp_path / "cache").exists()
+
+
+def test_none_means_that_nothing_was_given(tmp_path: Path) -> None:
+    plan = api.status(TEST_ONLY, "images", scenes=None, settings=None, config=None, forced=None, cache=tmp_path)
+    assert [planned.step.product for planned in plan.steps] == ["images"]
+
+
+def test_one_product_may_be_forced_by_a_text(tmp_path: Path) -> None:
+    assert api.status(TEST_ONLY, "images", forced="images", cache=tmp_path).forced == {"images"}
+    made = api.run(TEST_ONLY, "images", forced=iter(["images"]), cache=tmp_path)
+    assert made.plan.forced == {"images"}
 
 
 def test_a_result_is_found_by_product_and_scene(trained: Result) -> None:
@@ -149,8 +208,8 @@ def test_the_figures_of_opened_metrics_have_names_and_units(trained: Result) -> 
     ("product", "scene", "message"),
     [
         pytest.param("costvolume", None, r"3 results fit \(test-0, train-0, train-1\); name a scene", id="several"),
-        pytest.param("costvolume", "nope", r"0 results fit", id="no such scene"),
-        pytest.param("confidences", None, r"0 results fit \(none\)", id="no such product"),
+        pytest.param("costvolume", "test", r"was not made of test; did you mean test-0", id="no such scene"),
+        pytest.param("confidences", None, r"^no confidences was made; did you mean confidence", id="no such product"),
     ],
 )
 def test_what_is_not_one_result_is_refused(trained: Result, product: str, scene: str | None, message: str) -> None:

@@ -74,6 +74,7 @@ def test_whole_numbers_of_every_kind_are_taken(number: int) -> None:
         pytest.param({"disp12MaxDiff": "1"}, "disp12MaxDiff = '1': give a number", id="a difference as a text"),
         pytest.param({"disp12MaxDiff": float("nan")}, "disp12MaxDiff = nan", id="NaN is no difference"),
         pytest.param({"disp12MaxDiff": 1, "tolerance": 3}, "disp12MaxDiff and tolerance both", id="two tolerances"),
+        pytest.param({"cache": 3}, "cache = 3: give a folder", id="no cache"),
         pytest.param({"settings": ["costvolume.mod=fast"]}, "did you mean", id="an unknown setting"),
         pytest.param({"settings": {"costvolume.mode": "quick"}}, "costvolume.mode", id="an unknown value"),
     ],

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.opening import open_product, recorded
 from semidense.pipeline.results.result import Result
 from tests.handmade import Handmade, handmade
@@ -54,3 +55,18 @@ def test_attributes_are_texts_and_numbers(made: Handmade) -> None:
     assert json.loads(attrs["params"]) == {"subpixel": False}
     assert json.loads(attrs["size"]) == entry.size
     assert recorded(xr.Dataset(), "params") == {}
+
+
+def test_every_attribute_is_recorded_or_told_as_plain(made: Handmade) -> None:
+    opened = open_product(made.store, made.entries["disparity"].key)
+    plain = {name for name in opened.attrs if not _is_recorded(opened, name)}
+    assert plain == {"key", "digest", "stage", "created", "seconds"}
+
+
+def _is_recorded(opened: xr.Dataset, name: str) -> bool:
+    try:
+        recorded(opened, name)
+    except UsageError as refused:
+        assert str(refused) == f"{name} is no JSON text; read it as dataset.attrs['{name}']"
+        return False
+    return True
