@@ -6,10 +6,11 @@ whose packages or training scenes are missing is left out, with the reason.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Unpack
 
 import numpy as np
 
-from semidense.pipeline.api import Task, carry_out
+from semidense.pipeline.api import Data, Options, Task, carry_out
 from semidense.pipeline.comparison.ablation import ablation_rows
 from semidense.pipeline.comparison.maps import map_rows
 from semidense.pipeline.comparison.methods import LOWERED, MATCHERS, matcher_rows, measure_rows, ours
@@ -22,6 +23,7 @@ from semidense.pipeline.comparison.rows import (
     raw_rows,
 )
 from semidense.pipeline.execution.watch import Watch
+from semidense.pipeline.plan.arguments import Texts
 from semidense.pipeline.plan.plan import Made
 from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.results.metric_rows import METHOD, mean_rows
@@ -72,21 +74,23 @@ class Comparison:
 
 
 def compare(
-    task: Task | str = "motorcycle",
-    experiments: Sequence[str] = EXPERIMENTS,
+    dataset: Data | Task = "motorcycle",
+    experiments: Texts = EXPERIMENTS,
     train_on: str | None = None,
-    protocols: Sequence[str] = (),
+    protocols: Texts = (),
     *,
-    without: Sequence[str] = (),
+    without: Texts = (),
     maps: Mapping[str, str] | None = None,
     watch: Watch | None = None,
     scheduler: str | None = None,
     workers: int | None = None,
+    **options: Unpack[Options],
 ) -> Comparison:
     """Run the paper's experiments on the scenes of a dataset that have a ground truth.
 
     Args:
-        task: what to work on; a text is a dataset. The two networks have their shipped weights.
+        dataset: what to work on: a dataset, or a task that ``options`` refine. The two networks have their shipped
+            weights.
         experiments: of ``EXPERIMENTS``.
         train_on: dataset whose training scenes O1 and CCNN learn from, and on which matching-Nets with different
             channels are trained from nothing, alike; without it, those rows are left out.
@@ -98,11 +102,12 @@ def compare(
         watch: as for ``run``.
         scheduler: as for ``run``.
         workers: as for ``run``.
+        **options: as for ``run``.
 
     Raises:
         UsageError, DatasetError, CacheError, StageError: what the user can mend, in one line.
     """
-    task = Task(task) if isinstance(task, str) else task
+    task = Task.of(dataset, **options)
     prepared = prepare(task, experiments, train_on, protocols, without=without, maps=maps)
     return carry_out_comparison(prepared, watch=watch, scheduler=scheduler, workers=workers)
 

@@ -11,6 +11,7 @@ from semidense.pipeline.comparison.maps import map_requests
 from semidense.pipeline.comparison.methods import MATCHERS, MEASURES
 from semidense.pipeline.comparison.paper_figures import NAMED
 from semidense.pipeline.comparison.protocols import PROTOCOLS, protocol_requests, require_protocols
+from semidense.pipeline.plan.arguments import Texts, texts
 from semidense.pipeline.plan.config import setting_texts
 from semidense.pipeline.plan.environment import missing_packages
 from semidense.pipeline.plan.errors import UsageError, nearest
@@ -72,14 +73,16 @@ class Prepared:
 
 def prepare(
     task: Task,
-    experiments: Sequence[str] = EXPERIMENTS,
+    experiments: Texts = EXPERIMENTS,
     train_on: str | None = None,
-    protocols: Sequence[str] = (),
+    protocols: Texts = (),
     *,
-    without: Sequence[str] = (),
+    without: Texts = (),
     maps: Mapping[str, str] | None = None,
 ) -> Prepared:
     """Return what a comparison will make; arguments and errors are those of ``compare``."""
+    experiments, protocols = texts("experiments", experiments), texts("protocols", protocols)
+    without = texts("without", without)
     _require(task, experiments)
     require_protocols(protocols)
     _require_others(without)
@@ -95,7 +98,7 @@ def prepare(
     ablation = ablation_request(task, dataset, training) if trained else None
     named = (*_beside(task, dataset, training), *lenient)
     given = tuple(map_requests(task, dataset, maps or {}, ALWAYS))
-    return Prepared(task, tuple(experiments), request, ablation, named, given, unavailable, tuple(notes))
+    return Prepared(task, experiments, request, ablation, named, given, unavailable, tuple(notes))
 
 
 def _beside(task: Task, dataset: Dataset, training: tuple[SceneSource, ...]) -> Iterator[tuple[str, Request]]:

@@ -1,20 +1,22 @@
 """The report to hand around: one HTML file that needs nothing else."""
 
 from pathlib import Path
+from typing import Unpack
 
-from semidense.pipeline.api import Task
+from semidense.pipeline.api import Data, Options, Task
 from semidense.pipeline.plan.errors import UsageError
 
 _START = 1000
 """Bytes in which a report says what wrote it."""
 
 
-def report(task: Task | str = "motorcycle", output: Path | str = "report.html") -> Path:
+def report(dataset: Data | Task = "motorcycle", output: Path | str = "report.html", **options: Unpack[Options]) -> Path:
     """Write what is cached of a dataset as one self-contained HTML file, and return its path. Nothing is made.
 
     Args:
-        task: what to report on; a text is a dataset.
+        dataset: what to report on: a dataset, or a task that ``options`` refine.
         output: the file; an existing report is replaced, at once.
+        **options: as for ``run``.
 
     Raises:
         UsageError: if nothing of it is cached, the file cannot be written, or it is there and no report.
@@ -27,7 +29,7 @@ def report(task: Task | str = "motorcycle", output: Path | str = "report.html") 
 
     path = Path(output)
     _refuse_foreign(path)
-    document = page(gather(Task(task) if isinstance(task, str) else task)).encode()
+    document = page(gather(Task.of(dataset, **options))).encode()
     with explaining(path), atomic_write(path) as file:
         file.write(document)
     return path

@@ -121,6 +121,6 @@ def gather(task: Task) -> Gathered:
             name = by_id[target].step.scene
             scenes.append(GatheredScene(name, steps, store, baselines.get(name, {})))
     if not scenes:
-        raise UsageError(f"nothing of {task.dataset} is cached in {store.root}: make it with `{run_command(task)}`")
+        raise UsageError(f"nothing of {task.spec} is cached in {store.root}: make it with `{run_command(task)}`")
     config = next(iter(request.configs.values()))
     return Gathered(task, plan, store, tuple(scenes), config.of("semidense", SemidenseParams))

@@ -23,6 +23,7 @@ from semidense.pipeline.pages.report.gathered import Gathered
 from semidense.pipeline.pages.report.graph import graph, steps_table
 from semidense.pipeline.pages.report.networks import networks
 from semidense.pipeline.pages.report.pictures import svg
+from semidense.pipeline.plan.config import setting_texts
 from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, averaged
 from semidense.pipeline.results.settings import filter_text
 from semidense.pipeline.results.text import time_text
@@ -46,7 +47,7 @@ def page(found: Gathered) -> str:
     parts = [(title, body) for title, body in _parts(found) if body]
     sections = [tag("section", tag("h2", text(title)), body, id=_anchor(title)) for title, body in parts]
     links = [tag("li", tag("a", text(title), href=f"#{_anchor(title)}")) for title, _ in parts]
-    head = _head(f"{found.task.dataset}: report")
+    head = _head(f"{found.task.spec}: report")
     top = tag("header", *_title(found), _cards(found), tag("nav", tag("ul", *links), aria_label="Parts of this report"))
     script = f"<script>{_resource('report.js')}</script>"
     return f'<!doctype html>\n<html lang="en">{head}<body>{top}{tag("main", *sections)}{script}</body></html>\n'
@@ -73,9 +74,10 @@ def _title(found: Gathered) -> Iterator[Html]:
     task = found.task
     scenes = [scene.name for scene in found.scenes]
     yield tag("h1", text(f"Semi-dense stereo: {scenes[0] if len(scenes) == 1 else f'{len(scenes)} scenes'}"))
-    chosen = [f"--config {task.config}"] * bool(task.config) + [f"--set {each}" for each in task.settings]
-    told = " ".join([f"--preset {task.preset}", *chosen, *["--train"] * task.train])
-    yield tag("p", text(f"{task.dataset}, {told}; written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"), class_="quiet")
+    config = [f"--config {task.config}"] * bool(task.config)
+    chosen = [f"--set {each}" for each in setting_texts(task.settings)]
+    told = " ".join([f"--preset {task.preset}", *config, *chosen, *["--train"] * task.train])
+    yield tag("p", text(f"{task.spec}, {told}; written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"), class_="quiet")
 
 
 def _cards(found: Gathered) -> Html:

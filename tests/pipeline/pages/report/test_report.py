@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from semidense.pipeline.api import Task
+from semidense.datasets import open_dataset
+from semidense.pipeline.api import Task, open_store
 from semidense.pipeline.pages.report import report
 from semidense.pipeline.pages.report.page import _cards
 from semidense.pipeline.plan.errors import UsageError
@@ -104,6 +105,19 @@ def test_shipped_weights_say_where_they_come_from(weights: Path, tmp_path: Path)
     task = Task(TEST_ONLY, cache=tmp_path / "cache")
     run(task, upto="disparity")
     assert "the weights that come with the package" in report(task, tmp_path / "r.html").read_text()
+
+
+def test_it_takes_what_a_run_takes(weights: Path, tmp_path: Path) -> None:
+    from semidense.pipeline.api import run
+
+    dataset, store = open_dataset(TEST_ONLY), open_store(tmp_path / "cache")
+    run(dataset, upto="channels", cache=store)
+    for given in (dataset, TEST_ONLY, Task(TEST_ONLY)):
+        page = report(given, tmp_path / "r.html", cache=store, settings="semidense.R=0.5").read_text()
+        assert f"<title>{TEST_ONLY}: report</title>" in page
+        assert "--set semidense.R=0.5" in page
+    with pytest.raises(UsageError, match=f"nothing of {TEST_ONLY} is cached in .*--cache {tmp_path}/none"):
+        report(dataset, tmp_path / "r.html", cache=open_store(tmp_path / "none"))
 
 
 def test_the_settings_are_told(trained_task: Task, tmp_path: Path) -> None:
