@@ -37,11 +37,11 @@ def as_array(what: str, given: object) -> np.ndarray[Any, Any]:
     if given is None:
         raise DatasetError(f"{what} is None: was its file read?")
     if isinstance(given, str | PathLike):
-        raise DatasetError(f"{what} is the path {fspath(given)!r} beside an array: give all as files, or all as arrays")
+        raise DatasetError(f"{what} is the path {fspath(given)!r}, no array: give all as arrays, or all as files")
     try:
         return given if isinstance(given, np.ma.MaskedArray) else np.asarray(given)
     except (ValueError, TypeError, RuntimeError) as error:  # torch raises the latter two
-        raise DatasetError(f"{what} is no array: {error}; give NumPy's") from error
+        raise DatasetError(f"{what} is no array: {error}; give a NumPy array") from error
 
 
 def check_image(what: str, image: ImageArray) -> None:

@@ -90,7 +90,7 @@ def nearest(name: object, known: Iterable[str], prefix: str = "") -> str:
     """Return a hint: the nearest known name, or all of them if none is near."""
     names = list(known)
     folded = {item.lower(): item for item in names}
-    near = difflib.get_close_matches(str(name).lower(), folded, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(name.lower(), folded, n=1, cutoff=0.5) if isinstance(name, str) else []
     if near:
         return f"did you mean {prefix}{folded[near[0]]}?"
     return f"there are {', '.join(prefix + item for item in names)}" if names else "it has no settings"

@@ -77,9 +77,9 @@ VIEW = np.arange(80, dtype=np.uint8).reshape(4, 20)
     ("view", "message"),
     [
         pytest.param(None, "right image is None: was its file read", id="a file that was not read"),
-        pytest.param("right.png", r"path 'right.png' beside an array: give all as files, or", id="a file"),
-        pytest.param(Path("r.png"), r"path 'r.png' beside an array", id="a path"),
-        pytest.param([[1, 2], [3]], "right image is no array: .*; give NumPy's", id="rows of several lengths"),
+        pytest.param("right.png", r"path 'right.png', no array: give all as arrays, or", id="a file"),
+        pytest.param(Path("r.png"), r"path 'r.png', no array", id="a path"),
+        pytest.param([[1, 2], [3]], "right image is no array: .*; give a NumPy array", id="rows of several lengths"),
         pytest.param(torch.zeros((4, 20), requires_grad=True), "is no array: .*detach", id="a tensor that is learnt"),
         pytest.param(torch.zeros((4, 20), dtype=torch.bfloat16), "is no array: .*BFloat16", id="bfloat16"),
         pytest.param(np.ma.masked_less(VIEW, 3), r"has masked pixels.*give array\.filled", id="masked"),

@@ -19,7 +19,7 @@ MAP = np.full((4, 20), 3, np.float32)
     [
         pytest.param((VIEW, None, VIEW), {}, "the disparity map is None: was its file read", id="no map"),
         pytest.param(("left.png", None, "right.png"), {}, "map is None", id="no map beside files"),
-        pytest.param((VIEW, "map.pfm"), {}, "map is the path 'map.pfm' beside an array", id="a file and an array"),
+        pytest.param((VIEW, "map.pfm"), {}, "map is the path 'map.pfm', no array", id="a file and an array"),
         pytest.param((VIEW, MAP), {"none": "5"}, "none = '5': give a number", id="none as a text"),
         pytest.param((VIEW, MAP), {"unit": "inch"}, "unit 'inch'", id="a unit without a calibration"),
         pytest.param((VIEW, MAP), {"R": 0.5, "settings": {"semidense.density": 0.5}}, "give one of them", id="R"),

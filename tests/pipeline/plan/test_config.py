@@ -147,3 +147,4 @@ def test_nearest_gives_the_name_or_all_names() -> None:
     assert nearest("disparty", ["disparity", "images"]) == "did you mean disparity?"
     assert nearest("zzz", ["a", "b"]) == "there are a, b"
     assert nearest("zzz", []) == "it has no settings"
+    assert nearest(None, ["none", "some"]) == "there are none, some", "what is no text is near to no name"
