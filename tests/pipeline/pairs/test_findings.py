@@ -15,7 +15,13 @@ def survey(
     matches[:, 0], matches[:, 1] = 40 * step * (np.arange(count) // 40), 20 * step * (np.arange(count) % 40)
     matches[:, 2], matches[:, 3] = disparity, vertical
     likely = matches[:, 2].min(), matches[:, 2].max()
-    return {"matches": matches, "equal": np.array([equal]), "step": np.array([step]), "range": np.array(likely)}
+    return {
+        "matches": matches,
+        "equal": np.array([equal]),
+        "step": np.array([step]),
+        "range": np.array(likely),
+        "left": np.zeros((500 // step, 800 // step), np.uint8),
+    }
 
 
 RAMP = np.linspace(-1, 1, 1000)
@@ -51,6 +57,43 @@ def test_matches_of_the_same_few_places_tell_nothing_of_the_rows() -> None:
     small = survey(20, 6 * RAMP)
     small["matches"][:, :2] /= 16
     assert findings(small, None) == []
+
+
+CHANCE = np.random.default_rng(0).uniform(-1, 1, (2, 1000))
+"""What matches that are found by chance have in common: nothing."""
+
+
+@pytest.mark.parametrize("squares", [50, 1000])
+@pytest.mark.parametrize(
+    ("disparity", "vertical", "contradict"),
+    [
+        pytest.param(20 + 5 * RAMP, CHANCE[0], False, id="a sound pair with little texture"),
+        pytest.param(20 + 90 * RAMP, 0, False, id="near and far things"),
+        pytest.param(600 * CHANCE[0], CHANCE[1], True, id="one view mirrored: all disparities"),
+    ],
+)
+def test_matches_that_contradict_each_other_are_told(
+    disparity: object, vertical: object, contradict: bool, squares: int
+) -> None:
+    found = survey(disparity, vertical)
+    found["matches"][:, :2] = found["matches"][np.arange(1000) % squares, :2]
+    said = findings(found, DisparityRange(-600, 600))
+    assert len(said) == contradict
+    assert all("contradict each other" in line and "mirrored" in line and "\n" not in line for line in said)
+
+
+def test_few_matches_that_are_not_level_are_told() -> None:
+    """Rows lie further apart than the survey searches: only some matches are found, all over the rows it searched."""
+    found = survey(20, 8 * CHANCE[0])
+    found["matches"][:, :2] = found["matches"][np.arange(1000) % 50, :2]
+    (line,) = findings(found, None)
+    assert "contradict each other" in line and "more than 8 px apart" in line
+
+
+@pytest.mark.parametrize(("step", "vertical", "told"), [(1, 8, True), (1, -8, True), (1, 7, False), (2, 8, False)])
+def test_an_offset_at_the_end_of_the_search_may_be_larger(step: int, vertical: float, told: bool) -> None:
+    (line,) = findings(survey(20, vertical, step=step), None)
+    assert ("or further off: the search ends at 8 px" in line) == told
 
 
 def test_rows_that_were_shifted_are_told() -> None:
