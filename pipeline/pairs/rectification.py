@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from semidense.datasets.errors import CalibrationError
 from semidense.datasets.formats.calibration.cameras import MILLIMETRES, Cameras, calibrated
-from semidense.datasets.formats.calibration.markup import markup_values
+from semidense.datasets.formats.calibration.markup import lower, markup_values
+from semidense.datasets.formats.calibration.matrices import stored_size
 from semidense.datasets.formats.calibration.text import Matrix, floats, matrix, read_text
 from semidense.datasets.formats.images import read_image
 from semidense.pipeline.execution.tasks import provenance
@@ -67,11 +68,10 @@ def read_rig(files: Sequence[Path], size: tuple[int, int], alpha: float = 0.0) -
         alpha: with ``R T``: 0 shows only pixels that both lenses saw, 1 keeps every pixel.
 
     Raises:
-        CalibrationError: if a matrix is missing or not valid, the cameras do not stand side by side, or the file is of
-            images of another size.
+        CalibrationError: if a matrix is missing or not valid, the cameras do not stand side by side, two files
+            contradict each other, or one is of images of another size.
     """
-    path, values = files[0], _values(files)
-    _require_size(path, values, size)
+    path, values = files[0], _values(files, size)
     cameras = _camera(path, values, "m1"), _camera(path, values, "m2")
     distortions = _distortion(path, values, "d1"), _distortion(path, values, "d2")
     if {"r1", "r2", "p1", "p2"} <= values.keys():
@@ -89,10 +89,12 @@ def read_rig(files: Sequence[Path], size: tuple[int, int], alpha: float = 0.0) -
     return rig
 
 
-def _values(files: Sequence[Path]) -> dict[str, Any]:
+def _values(files: Sequence[Path], size: tuple[int, int]) -> dict[str, Any]:
     """Return the values of all files, names in lower case."""
     found = [markup_values(path, read_text(path)) for path in files]
-    return {name.lower(): value for each in found for name, value in each.items()}
+    for path, each in zip(files, found, strict=True):
+        _require_size(path, lower(str(path), each), size)
+    return lower(" and ".join(map(str, files)), *found)
 
 
 def _rectified(
@@ -202,20 +204,12 @@ def _value(values: Mapping[str, Any], name: str) -> object:
 
 
 def _require_size(path: Path, values: Mapping[str, Any], size: tuple[int, int]) -> None:
-    told = tuple(values.get(name) for name in ("image_height", "image_width"))
-    if None not in told and [_number(each) for each in told] != [*size]:
+    told = stored_size(path, values)
+    if any(side not in (None, own) for side, own in zip(told, size, strict=True)):
         raise CalibrationError(
-            f"{path}: it is of images of {told[0]} x {told[1]} pixels, these have {size[0]} x {size[1]}; "
+            f"{path}: it is of images of {told[0] or '?'} x {told[1] or '?'} pixels, these have {size[0]} x {size[1]}; "
             "calibrate with images of this size"
         )
-
-
-def _number(told: object) -> float | None:
-    """Return a number that a file may hold as a text; None if it is none."""
-    try:
-        return float(str(told))
-    except ValueError:
-        return None
 
 
 def _opencv() -> Any:  # noqa: ANN401

@@ -8,6 +8,7 @@
 Both views share the principal point. The numbers may stand on any lines; comments follow a ``#``.
 """
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -29,12 +30,12 @@ def intrinsics_cameras(path: Path, numbers: list[float]) -> Cameras:
     """Return what the numbers say.
 
     Raises:
-        CalibrationError: If they are not ten, or the baseline is not above 0.
+        CalibrationError: If they are not ten, or the baseline is not finite and above 0.
     """
     if len(numbers) != 10:
         raise CalibrationError(f"{path}: {len(numbers)} numbers; expected nine of the camera matrix and the baseline")
-    if numbers[9] <= 0:
-        raise CalibrationError(f"{path}: a baseline of {numbers[9]:g}; expected metres, above 0")
+    if not (math.isfinite(numbers[9]) and numbers[9] > 0):
+        raise CalibrationError(f"{path}: a baseline of {numbers[9]:g}; expected a number of metres, above 0")
     shared = matrix(path, "the camera matrix", numbers[:9], (3, 3))
     left, right = (np.column_stack([shared, [shift, 0, 0]]) for shift in (0, -shared[0, 0] * numbers[9]))
     return Cameras(path, left, right, "m")

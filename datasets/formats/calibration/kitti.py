@@ -21,10 +21,12 @@ from semidense.datasets.errors import CalibrationError
 from semidense.datasets.formats.calibration.cameras import Cameras
 from semidense.datasets.formats.calibration.text import Matrix, matrix, sides, without_comments
 
-_LINE = re.compile(r"^[ \t]*(\w+)[ \t]*:((?:[ \t,]+[-+.\deE]+)+)[ \t]*$", re.MULTILINE)
+_LINE = re.compile(r"^[ \t]*(\w+)[ \t]*:(.*)$", re.MULTILINE)
 _SYSTEMS = (("P1_roi", "P2_roi"), ("P_rect_02", "P_rect_03"), ("P_rect_00", "P_rect_01"), ("P2", "P3"), ("P0", "P1"))
 _FOLDERS = {"image_0": "0", "image_00": "0", "image_2": "2", "image_02": "2", "colored_0": "2"}
 """Number of the camera that a left view's folder tells."""
+_NUMBERED = {"P0": "0", "P2": "2", "P_rect_00": "0", "P_rect_02": "2"}
+"""Number of the left camera of each pair that has one; Karlsruhe's have none."""
 _WANTED = "expected P2 and P3, P0 and P1, P_rect_02 and P_rect_03, or P1_roi and P2_roi"
 
 
@@ -44,18 +46,28 @@ def kitti_cameras(path: Path, text: str, folder: str | None = None) -> Cameras:
             colour cameras are taken, and a warning gives both baselines.
 
     Raises:
-        CalibrationError: If there are no two cameras that belong together.
+        CalibrationError: If there are no two cameras that belong together, or none of the images' folder; if a line
+            that is needed does not hold its numbers, or a name is given twice.
     """
-    found = _LINE.findall(without_comments(text))
-    lines = {name: numbers.replace(",", " ").split() for name, numbers in found}
+    lines = _lines(path, text)
     pairs = [pair for pair in (*_SYSTEMS, ("P1", "P2")) if set(pair) <= lines.keys()]
     if not pairs:
         raise CalibrationError(f"{path}: no two cameras; {_WANTED}")
     camera = _number(folder)
-    chosen = _chosen(pairs, camera)
+    chosen = _chosen(path, pairs, camera)
     left, right = (matrix(path, name, lines[name], (3, 4)) for name in chosen)
     warnings = () if camera else _unsure(path, lines, pairs)
     return Cameras(path, left, right, "m", _size(path, lines, chosen[0]), warnings=warnings)
+
+
+def _lines(path: Path, text: str) -> dict[str, list[str]]:
+    """Return the words of each line under its name, also where they are no numbers: `matrix` judges what is needed."""
+    lines: dict[str, list[str]] = {}
+    for name, words in _LINE.findall(without_comments(text)):
+        if name in lines:
+            raise CalibrationError(f"{path}: {name} is given twice; keep the line that is right")
+        lines[name] = words.replace(",", " ").split()
+    return lines
 
 
 def _number(folder: str | None) -> str | None:
@@ -64,10 +76,19 @@ def _number(folder: str | None) -> str | None:
     return next((_FOLDERS[name] for name in names if name in _FOLDERS), None)
 
 
-def _chosen(pairs: list[tuple[str, str]], number: str | None) -> tuple[str, str]:
-    """Return the pair whose left camera has the number, else the first one."""
-    same = [pair for pair in pairs if number and pair[0] in (f"P{number}", f"P_rect_0{number}")]
-    return (same or pairs)[0]
+def _chosen(path: Path, pairs: list[tuple[str, str]], number: str | None) -> tuple[str, str]:
+    """Return the pair whose left camera has the number; the first one without a number, or if no pair has any."""
+    numbers = {pair: _NUMBERED[pair[0]] for pair in pairs if pair[0] in _NUMBERED}
+    if number is None or not numbers:
+        return pairs[0]
+    same = next((pair for pair, each in numbers.items() if each == number), None)
+    if same is None:
+        there = next(iter(numbers))
+        raise CalibrationError(
+            f"{path}: it has {there[0]} and {there[1]}, but the images' folder is that of camera {number}; give the "
+            f"file with P{number} and P{int(number) + 1}, or P_rect_0{number} and P_rect_0{int(number) + 1}"
+        )
+    return same
 
 
 def _unsure(path: Path, lines: Mapping[str, list[str]], pairs: list[tuple[str, str]]) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ import numpy as np
 
 from semidense.datasets.errors import CalibrationError
 from semidense.datasets.formats.calibration.cameras import VERTICAL, Cameras, unknown_format
+from semidense.datasets.formats.calibration.markup import lower
 from semidense.datasets.formats.calibration.text import Matrix, matrix, sides
 
 _CAMERA = ("k", "camera_matrix", "cameramatrix", "intrinsics")
@@ -46,11 +47,11 @@ def matrices_cameras(path: Path, found: Mapping[str, Any]) -> Cameras:
     Raises:
         CalibrationError: If a matrix is not valid, or what depth needs is not there.
     """
-    values = _flat(found)
-    views = _views(values)
+    values = _flat(path, found)
+    views = _views(path, values)
     left, right = _projections(path, values, views)
     unit = values.get("unit", values.get("units"))
-    size = next((size for each in (values, *views) if (size := _size(path, each))), None)
+    size = next((size for each in (values, *views) if (size := _whole_size(path, each))), None)
     doffs = _number(path, values, "doffs") if views and "doffs" in values else None
     return Cameras(path, left, right, None if unit is None else _word(unit), size, doffs=doffs)
 
@@ -60,21 +61,16 @@ def _word(value: object) -> str:
     return " ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-def _flat(found: Mapping[str, Any]) -> dict[str, Any]:
+def _flat(path: Path, found: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values with names in lower case; what Cityscapes keeps in two parts is put together."""
-    values = _lower(found)
-    parts = [_lower(values[name]) for name in _PARTS if isinstance(values.get(name), dict)]
-    return {name: value for each in (values, *parts) for name, value in each.items()}
+    values = lower(str(path), found)
+    return lower(str(path), values, *(values[name] for name in _PARTS if isinstance(values.get(name), dict)))
 
 
-def _lower(found: Mapping[str, Any]) -> dict[str, Any]:
-    return {str(name).lower(): value for name, value in found.items()}
-
-
-def _views(values: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _views(path: Path, values: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the values of the left and the right camera where each has its own, else nothing."""
     sides = next((pair for pair in _SIDES if all(isinstance(values.get(name), dict) for name in pair)), ())
-    return [_lower(values[name]) for name in sides]
+    return [lower(str(path), values[name]) for name in sides]
 
 
 def _projections(path: Path, values: Mapping[str, Any], views: Sequence[Mapping[str, Any]]) -> tuple[Matrix, Matrix]:
@@ -148,17 +144,32 @@ def _number(path: Path, values: Mapping[str, Any], name: str) -> float:
     return float(matrix(path, name, values[name], (1, 1))[0, 0])
 
 
-def _size(path: Path, values: Mapping[str, Any]) -> tuple[int, int] | None:
-    """Return rows and columns under one of their names; None if there are none."""
+def _whole_size(path: Path, values: Mapping[str, Any]) -> tuple[int, int] | None:
+    rows, columns = stored_size(path, values)
+    return None if rows is None or columns is None else (rows, columns)
+
+
+def stored_size(path: Path, values: Mapping[str, Any]) -> tuple[int | None, int | None]:
+    """Return rows and columns of the images under one of their names, None for a side that is not told.
+
+    Args:
+        path: The file, for messages.
+        values: Its values, names in lower case.
+
+    Raises:
+        CalibrationError: If a side is no whole number above 0.
+    """
     width, height, size, shape = (
         next((values[name] for name in names if name in values), None) for names in (_WIDTH, _HEIGHT, _SIZES, _SHAPES)
     )
     if isinstance(size, dict) and "data" not in size:
-        return _size(path, _lower(size))
-    if size is None and width is not None and height is not None:
-        size = [width, height]
-    if size is None and shape is None:
-        return None
+        return stored_size(path, lower(str(path), size))
     told = "the image's size"
-    first, second = sides(path, told, matrix(path, told, _numbers(shape if size is None else size), (1, 2)))
-    return (first, second) if size is None else (second, first)
+    if size is not None:
+        columns, rows = sides(path, told, matrix(path, told, _numbers(size), (1, 2)))
+        return rows, columns
+    if shape is not None and (width is None or height is None):
+        return sides(path, told, matrix(path, told, _numbers(shape), (1, 2)))
+    given = [1 if side is None else side for side in (height, width)]
+    rows, columns = sides(path, told, matrix(path, told, given, (1, 2)))
+    return None if height is None else rows, None if width is None else columns

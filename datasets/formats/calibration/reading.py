@@ -17,7 +17,7 @@ from semidense.datasets.formats.calibration.ini import ini_values, is_ini
 from semidense.datasets.formats.calibration.intrinsics import intrinsics_cameras, numbers_only
 from semidense.datasets.formats.calibration.key_values import key_value_cameras
 from semidense.datasets.formats.calibration.kitti import is_kitti, kitti_cameras
-from semidense.datasets.formats.calibration.markup import markup_values, toml_values, yaml_values
+from semidense.datasets.formats.calibration.markup import lower, markup_values, toml_values, yaml_values
 from semidense.datasets.formats.calibration.matrices import matrices_cameras
 from semidense.datasets.formats.calibration.middlebury import middlebury_cameras
 from semidense.datasets.formats.calibration.ros import has_projection, ros_cameras
@@ -34,7 +34,8 @@ def read_cameras(files: Sequence[Path], unit: str | None = None, folder: str | N
 
     Raises:
         MissingFileError: If there is no such file.
-        CalibrationError: If a file is not valid, no unit is known, or the cameras are no rectified pair side by side.
+        CalibrationError: If a file is not valid, two files contradict each other, no unit is known, or the cameras are
+            no rectified pair side by side.
     """
     require_unit(unit)
     if len(files) not in (1, 2):
@@ -50,7 +51,7 @@ def _two_parts(files: Sequence[Path], texts: Sequence[str]) -> Cameras:
     infos = [info for path, text in zip(files, texts, strict=True) for info in _infos(path, text)]
     if any(has_projection(info) for info in infos):
         return ros_cameras(files, infos)
-    return matrices_cameras(files[-1], {name: value for info in infos for name, value in info.items()})
+    return matrices_cameras(files[-1], lower(" and ".join(map(str, files)), *infos))
 
 
 def _infos(path: Path, text: str) -> list[dict[str, Any]]:

@@ -150,11 +150,24 @@ def test_a_missing_matrix_is_named(taken: Path, tmp_path: Path, missing: str, wo
     assert not (tmp_path / "out").exists()
 
 
-def test_a_calibration_of_another_size_is_refused(taken: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("size", "words"),
+    [
+        ({"image_width": 640, "image_height": 480}, "480 x 640 pixels"),
+        ({"imageSize": [640, 480]}, "480 x 640 pixels"),
+        ({"resolution": {"width": 640, "height": 480}}, "480 x 640 pixels"),
+        ({"image_shape": [480, 640]}, "480 x 640 pixels"),
+        ({"image_width": 640}, r"\? x 640 pixels"),
+        ({"height": 480}, r"480 x \? pixels"),
+    ],
+)
+def test_a_calibration_of_another_size_is_refused(
+    taken: Path, tmp_path: Path, size: dict[str, object], words: str
+) -> None:
     given = values(plain((480, 640)), [np.eye(3), np.eye(3)])
-    told = {name: value.tolist() for name, value in given.items()} | {"image_width": 640, "image_height": 480}
+    told = {name: value.tolist() for name, value in given.items()} | size
     (tmp_path / "c.json").write_text(json.dumps(told))
-    with pytest.raises(CalibrationError, match="480 x 640 pixels"):
+    with pytest.raises(CalibrationError, match=words):
         rectify_files(taken / "left.png", taken / "right.png", [tmp_path / "c.json"], tmp_path / "out")
 
 
@@ -169,7 +182,8 @@ def test_a_calibration_of_another_size_is_refused(taken: Path, tmp_path: Path) -
         ({"M1": np.zeros((3, 3)).tolist()}, "M1 is no camera matrix"),
         ({"D1": [[0, 0], [0]]}, "D1 is no list of 4, 5, 8, 12 or 14 numbers"),
         ({"D2": ["a", "b", "c", "d"]}, "D2 is no list of 4, 5, 8, 12 or 14 numbers"),
-        ({"image_width": "wide", "image_height": 3}, "3 x wide|wide"),
+        ({"image_width": "wide", "image_height": 3}, "the image's size is no matrix of 1 x 2 numbers"),
+        ({"m1": np.eye(3).tolist()}, "m1 is given twice, with different values"),
     ],
 )
 def test_cameras_that_cannot_be_are_refused_before_anything_is_written(
@@ -181,6 +195,13 @@ def test_cameras_that_cannot_be_are_refused_before_anything_is_written(
     with pytest.raises(CalibrationError, match=words):
         rectify_files(taken / "left.png", taken / "right.png", [tmp_path / "c.json"], tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_two_files_that_contradict_each_other_are_refused(taken: Path, tmp_path: Path) -> None:
+    (tmp_path / "t.json").write_text(json.dumps({"T": [[-5], [0], [0]]}))
+    files = [taken / "stereo.yml", tmp_path / "t.json"]
+    with pytest.raises(CalibrationError, match=r"stereo\.yml and .*t\.json: T is given twice, with different values"):
+        rectify_files(taken / "left.png", taken / "right.png", files, tmp_path / "out")
 
 
 def test_projections_that_no_camera_has_are_refused(taken: Path, tmp_path: Path) -> None:

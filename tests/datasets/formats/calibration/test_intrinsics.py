@@ -28,7 +28,9 @@ def test_nine_numbers_and_a_baseline_in_metres(tmp_path: Path, text: str) -> Non
     ("text", "message"),
     [
         pytest.param("1 0 0 0 1 0 0 0 1", "9 numbers; expected nine of the camera matrix", id="no baseline"),
-        pytest.param("1 0 0 0 1 0 0 0 1 -2", "a baseline of -2; expected metres, above 0", id="negative"),
+        pytest.param("1 0 0 0 1 0 0 0 1 -2", "a baseline of -2; expected a number of metres, above 0", id="negative"),
+        pytest.param("1 0 0 0 1 0 0 0 1 nan", r"K\.txt: a baseline of nan", id="a baseline that is no number"),
+        pytest.param("1 0 0 0 1 0 0 0 1 inf", r"K\.txt: a baseline of inf", id="an infinite baseline"),
         pytest.param("5 0 0 0 5 0 3 2 1 2", "not .fx s cx; 0 fy cy; 0 0 1.; is it transposed", id="as MATLAB has it"),
         pytest.param("5 0 3 0 5 2 0 0 2 2", "not .fx s cx; 0 fy cy; 0 0 1.", id="another last row"),
         pytest.param("1 0 0 0 1 0 0 0 nan 2", "the camera matrix is no matrix", id="not a number"),

@@ -78,6 +78,28 @@ def test_two_cameras_are_enough(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "folder", "message"),
+    [
+        pytest.param(BENCHMARK.replace("P2: 7.2", "P2: nan 7.2"), "image_2", "P2 is no matrix", id="no number"),
+        pytest.param(BENCHMARK.replace("P2: 7", "P2: x7"), "photos", "P2 is no matrix", id="a word"),
+        pytest.param(f"P0: {P[0]}\nP1: {P[1]}\n", "image_2", "P0 and P1, but .* camera 2; .* P2 and P3", id="gray"),
+        pytest.param(f"P2: {P[2]}\nP3: {P[3]}\n", "image_00/data", "P2 and P3, but .* camera 0", id="colour"),
+        pytest.param(f"roi: 0 x 0 371\nP1_roi: {P[0]}\nP2_roi: {P[1]}\n", None, "roi is no matrix", id="roi"),
+        pytest.param(BENCHMARK + f"P2: {P[0]}\n", "image_2", "P2 is given twice", id="twice"),
+    ],
+)
+def test_no_line_is_passed_over_and_no_other_camera_taken(
+    tmp_path: Path, text: str, folder: str | None, message: str
+) -> None:
+    with pytest.raises(CalibrationError, match=message):
+        read(tmp_path, text, folder)
+
+
+def test_cameras_without_a_number_are_of_any_folder(tmp_path: Path) -> None:
+    assert read(tmp_path, f"P1_roi: {P[0]}\nP2_roi: {P[1]}\n", "image_0").calibration.focal == 721.5377
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
         pytest.param(f"P2: {P[2]}\n", "no two cameras; expected P2 and P3", id="one camera"),
