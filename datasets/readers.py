@@ -62,7 +62,7 @@ def assemble_truth(disparity: DisparityMap, right: DisparityMap | None, mask_fil
         mask_file: The published mask, an 8-bit image with 255 for visible in both views, or None.
 
     Raises:
-        DatasetError: If the mask cannot be read or the sizes differ.
+        DatasetError: If the mask cannot be read or marks no pixel as visible, or the sizes differ.
     """
     visible, kind = _visible(disparity, right, mask_file)
     return Truth(disparity, visible & ~np.isnan(disparity), kind, right)
@@ -81,4 +81,9 @@ def _read_mask(path: Path, shape: tuple[int, ...]) -> Mask:
     if mask.dtype != np.uint8 or mask.shape != shape:
         raise ImageError(f"{path}: a mask of {mask.dtype} {mask.shape}; the truth needs an 8-bit gray one of {shape}")
     visible: Mask = mask == VISIBLE
+    if not visible.any():
+        raise ImageError(
+            f"{path}: no pixel of this mask is {VISIBLE}, which marks those visible in both views; its values are "
+            f"{mask.min()} to {mask.max()}"
+        )
     return visible

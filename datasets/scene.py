@@ -228,14 +228,14 @@ class SceneSource:
         with exact_files(self.files, self.digests) as files:
             left, right = self._reader().read_images(files, self.parameters)
         Scene(self.name, left, right, None, self.disparities)
-        self._check_size("images", left)
+        self._check_size("left", "images", left)
         return left, right
 
     def load_costs(self) -> NDArray[np.float16]:
         """Read the cost volume that came with the scene, (y, x, d); raises what `load` raises."""
         with exact_files(self.files, self.digests) as files:
             costs = self._reader().read_costs(files, self.parameters)
-        self._check_size("cost volume", costs)
+        self._check_size("costs", "cost volume", costs)
         if costs.shape[2] != self.disparities.count:
             raise DatasetError(f"{self.name}: {costs.shape[2]} disparities, but {self.disparities.count} were listed")
         return costs
@@ -245,7 +245,7 @@ class SceneSource:
         maps = import_module(_MAPS)
         with exact_files(self.files, self.digests) as files:
             found: DisparityMap = maps.read_map(files["disparity"], maps.Reading(**self.map_reading))
-        self._check_size("disparity map", found)
+        self._check_size("disparity", "disparity map", found)
         return found
 
     def load_truth(self) -> Truth | None:
@@ -254,7 +254,7 @@ class SceneSource:
             return None
         with exact_files(self.files, self.digests) as files:
             truth = self._reader().read_truth(files, self.parameters)
-        self._check_size("truth", truth.disparity)
+        self._check_size("truth", "truth", truth.disparity)
         return truth
 
     def identity(self, roles: Collection[str] | None = None) -> dict[str, Any]:
@@ -288,9 +288,9 @@ class SceneSource:
     def _reader(self) -> SceneReader:
         return cast(SceneReader, import_module(self.reader))
 
-    def _check_size(self, what: str, array: np.ndarray[Any, Any]) -> None:
+    def _check_size(self, role: str, what: str, array: np.ndarray[Any, Any]) -> None:
         if array.shape[:2] != self.size:
             rows, columns = self.size
-            raise DatasetError(
-                f"{self.name}: {what} of {size_text(array)}, but {rows} x {columns} was listed; list it again"
-            )
+            told = "was listed: list it again" if role in IMAGE_ROLES else "is the images' size: both must agree"
+            where = self.files.get(role, self.name)
+            raise DatasetError(f"{where}: {what} of {size_text(array)}, but {rows} x {columns} {told}")

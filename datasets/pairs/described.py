@@ -15,7 +15,7 @@
     unit = "m"                     of a calibration that does not tell it
 
 Patterns are relative to the file and hold one ``*``, in a file's or a folder's name. The name of the data set is that
-of the file. A scene may lack its truth, never a view.
+of the file. A scene may lack what is optional, if another scene has it; it never lacks a view.
 """
 
 import math
@@ -47,6 +47,8 @@ _ENTRIES: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("d_min", "d_max"), (int,)),
     "scale": (int, float),
 }
+_NEEDS = {"truth_right": "truth", "mask": "truth", "scale": "truth", "unit": "calib"}
+"""What an entry says something of."""
 _LARGEST_FILE = 1 << 16
 _SCALES = (1e-6, 1e9)
 """Smallest and largest stored value of 1 px, but for its sign."""
@@ -56,17 +58,21 @@ def list_scenes(argument: str) -> tuple[SceneSource, ...]:
     """List the scenes of a description, in the order of their names.
 
     Raises:
-        LayoutError: If a pattern finds nothing, or a left view has no right one.
+        LayoutError: If a pattern finds nothing of any scene, or a left view has no right one.
         DatasetError: If the description, or a file that must be looked into, is not valid.
     """
     path = user_path(argument)
     entries = _entries(path)
-    found = {role: _matches(path.parent, entries[role]) for role in _ROLES if role in entries}
+    found = {role: _matches(path, role, entries[role]) for role in _ROLES if role in entries}
     missing = sorted(found["left"].keys() - found["right"].keys())
     if not found["left"] or missing:
         what = f"no right view for {found['left'][missing[0]]}" if missing else "no left view"
         raise LayoutError(f"{path}: {what}; left = {entries['left']!r}, right = {entries['right']!r}")
     names = sorted(found["left"])
+    for role, paths in found.items():
+        if not paths.keys() & {*names, ""}:
+            there = f"finds no scene but {min(paths)}, and the first one is {names[0]}" if paths else "finds nothing"
+            raise LayoutError(f"{path}: {role} = {entries[role]!r} {there}; correct the pattern, or leave it out")
     return tuple(_source(path, entries, name or found["left"][name].stem, _files(found, name)) for name in names)
 
 
@@ -97,7 +103,7 @@ def _entries(path: Path) -> dict[str, Any]:
         if name not in _ENTRIES:
             raise DatasetError(f"{path}: {name} is not known; known are {', '.join(_ENTRIES)}")
         if not isinstance(value, _ENTRIES[name]) or isinstance(value, bool):
-            expected = "text" if str in _ENTRIES[name] else "a number"
+            expected = {str: "text", int: "a whole number"}.get(_ENTRIES[name][-1], "a number")
             raise DatasetError(f"{path}: {name} = {value!r}; expected {expected}")
     _check(path, entries)
     return entries
@@ -120,19 +126,22 @@ def _check(path: Path, entries: Mapping[str, Any]) -> None:
     for role in ("truth", "truth_right"):
         if "scale" not in entries and not entries.get(role, ".pfm").lower().endswith(".pfm"):
             raise DatasetError(f"{path}: no scale; {role} is an image, so give the stored value of 1 px")
+    for name, other in _NEEDS.items():
+        if name in entries and other not in entries:
+            raise DatasetError(f"{path}: {name} = {entries[name]!r}, but no {other}; give both, or leave {name} out")
 
 
-def _matches(folder: Path, pattern: str) -> dict[str, Path]:
+def _matches(path: Path, role: str, pattern: str) -> dict[str, Path]:
     """Return the files that a pattern fits, by what its ``*`` stands for; without ``*`` one file, for all scenes."""
     if pattern.count("*") > 1 or set(pattern) & set("[]?"):
-        raise LayoutError(f"{pattern}: give one * in a pattern, which names the scene, and no [, ] or ?")
+        raise LayoutError(f"{path}: {role} = {pattern!r}; give one *, which names the scene, and no [, ] or ?")
     pattern = PurePath(pattern).as_posix()  # without the ./ that a match will not have
     fits = re.compile(re.escape(composed(pattern)).replace(r"\*", "([^/]*)"))
     found = {}
-    for path in sorted(folder.glob(pattern)):
-        match = fits.fullmatch(composed(path.relative_to(folder).as_posix()))
-        if match and path.is_file() and not path.name.startswith("."):
-            found["".join(match.groups())] = path
+    for file in sorted(path.parent.glob(pattern)):
+        match = fits.fullmatch(composed(file.relative_to(path.parent).as_posix()))
+        if match and file.is_file() and not file.name.startswith("."):
+            found["".join(match.groups())] = file
     return found
 
 
@@ -147,9 +156,12 @@ def _source(path: Path, entries: Mapping[str, Any], name: str, files: dict[str, 
     known = read_cameras([calib], entries.get("unit"), str(files["left"].absolute().parent)) if calib else None
     size = image_size(files["left"])
     options = PairOptions(d_min=entries.get("d_min"), d_max=entries.get("d_max"))
-    source = SceneSource(**described(name, size, options, known), files=files)
+    try:
+        about = described(name, size, options, known)
+    except DatasetError as error:
+        raise type(error)(f"{path}: {error}") from error
     source = replace(
-        source,
+        SceneSource(**about, files=files),
         dataset=path.stem,
         split=entries.get("split", "test"),
         reader=__name__,

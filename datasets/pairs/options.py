@@ -124,8 +124,16 @@ def parse(argument: str) -> _Specification:
         else:
             sides.append(item)
     if not all(sides) or len(sides) not in (1, 2):
-        raise DatasetError(f"pair:{argument}: {len(sides)} paths; write {PATTERN}")
+        raise DatasetError(f"pair:{argument}: {_unknown(sides)}; write {PATTERN}")
     return sides, options
+
+
+def _unknown(sides: Sequence[str]) -> str:
+    """Say what is wrong with too many paths, or too few."""
+    keys = (side.partition("=")[0] for side in sides if "=" in side)
+    key = next(filter(str.isidentifier, keys), None)
+    told = f"{key} is not known; known are {', '.join(_KEYS)}" if key else f"{len(sides)} paths"
+    return f"{told}; a path with a comma stands in double quotes"
 
 
 def _as_path(side: str) -> str:

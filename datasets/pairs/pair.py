@@ -152,7 +152,7 @@ def described(name: str, size: tuple[int, int], options: PairOptions, known: Pai
         DatasetError: If the range is empty or wider than the image.
     """
     known = known and known.fitted(name, size)
-    disparities, open_ends = _range(size[1], options, known)
+    disparities, open_ends = _range(name, size[1], options, known)
     return {
         "name": name,
         "dataset": "pair",
@@ -168,7 +168,7 @@ def described(name: str, size: tuple[int, int], options: PairOptions, known: Pai
 
 
 def _range(
-    width: int, options: PairOptions, known: PairCalibration | None
+    name: str, width: int, options: PairOptions, known: PairCalibration | None
 ) -> tuple[DisparityRange, tuple[RangeEnd, ...]]:
     """Return the range to search, and which of its ends only the image's width bounds."""
     # ETH3D's ``ndisp`` is the image's width: it bounds nothing.
@@ -179,8 +179,8 @@ def _range(
     for key, value in (("d_min", low), ("d_max", high)):
         if value is not None and abs(value) >= width:
             raise DatasetError(
-                f"pair: {key}={value}, but the image is only {width} px wide: its disparities lie between {1 - width} "
-                f"and {width - 1} px"
+                f"{name}: {key}={value}, but the image is only {width} px wide: its disparities lie between "
+                f"{1 - width} and {width - 1} px"
             )
     open_ends: list[RangeEnd] = []
     open_ends += ["minimum"] if low is None else []

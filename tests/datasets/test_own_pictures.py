@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image, TiffImagePlugin
 
-from semidense.datasets import Calibration, DatasetError, ImageError, open_dataset
+from semidense.datasets import Calibration, DatasetError, ImageError, open_dataset, write_pfm
 from semidense.datasets.formats.calibration.reading import read_cameras
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own-pictures.md").read_text()
@@ -241,9 +241,12 @@ def test_the_description_on_the_page_is_read(tmp_path: Path, save_image: Callabl
     (described,) = re.findall(r"```\n(left = .*?)```", PAGE, re.DOTALL)
     for side in ("left", "right"):
         save_image(tmp_path / side / "a.png", np.zeros((480, 640), np.uint8))
+    (tmp_path / "disparity").mkdir()
+    write_pfm(tmp_path / "disparity/a.pfm", np.full((480, 640), 7, np.float32))
+    save_image(tmp_path / "visible/a.png", np.full((480, 640), 255, np.uint8))
     middlebury(tmp_path)
     (tmp_path / "own.toml").write_text(described)
     (scene,) = open_dataset(f"toml:{tmp_path}/own.toml").scenes
-    assert (scene.name, scene.split, scene.has_truth) == ("a", "test", False)
+    assert (scene.name, scene.split, scene.has_truth) == ("a", "test", True)
     assert (scene.disparities.minimum, scene.disparities.maximum) == (0, 191)
     assert scene.calibration is not None

@@ -180,7 +180,7 @@ def test_a_file_gone_since_listing_is_named(source: SceneSource) -> None:
 
 def test_a_size_changed_since_listing_is_named(source: SceneSource) -> None:
     changed = replace(source, size=(6, 9))
-    with pytest.raises(DatasetError, match="one: images of 6 x 8, but 6 x 9 was listed"):
+    with pytest.raises(DatasetError, match=r"left\.png: images of 6 x 8, but 6 x 9 was listed: list it again"):
         changed.load_images()
-    with pytest.raises(DatasetError, match="one: truth of 6 x 8"):
+    with pytest.raises(DatasetError, match=r"\.png: truth of 6 x 8, but 6 x 9 is the images' size"):
         changed.load_truth()

@@ -75,12 +75,22 @@ def test_the_scale_is_part_of_what_the_truth_is(folder: Path) -> None:
     [
         pytest.param('left = "left/*.png"\n', 'no right; write a pattern such as right = "right/', id="no right"),
         pytest.param(VIEWS + "depth = 3\n", "depth is not known; known are left, right", id="unknown"),
-        pytest.param(VIEWS + 'd_max = "far"\n', "d_max = 'far'; expected a number", id="text for a number"),
-        pytest.param(VIEWS + "d_max = true\n", "d_max = True; expected a number", id="truth for a number"),
+        pytest.param(VIEWS + 'd_max = "far"\n', "d_max = 'far'; expected a whole number", id="text for a number"),
+        pytest.param(VIEWS + "d_max = true\n", "d_max = True; expected a whole number", id="truth for a number"),
+        pytest.param(VIEWS + "d_min = 0.5\n", "d_min = 0.5; expected a whole number", id="a part of a pixel"),
+        pytest.param(VIEWS + 'scale = "1"\n', "scale = '1'; expected a number", id="text for a scale"),
+        pytest.param(VIEWS + "d_min = 5\nd_max = 2\n", r"orchard\.toml: .*\[5, 2\] is empty", id="an empty range"),
+        pytest.param(VIEWS + "d_max = 8\n", r"orchard\.toml: a: d_max=8, but .* only 8 px", id="a range too wide"),
+        pytest.param(VIEWS + 'unit = "m"\n', "unit = 'm', but no calib; give both", id="a unit of nothing"),
+        pytest.param(VIEWS + 'mask = "mask/*.png"\n', "mask = .*, but no truth; give both", id="a mask of nothing"),
         pytest.param(VIEWS + 'split = "val"\n', "split = 'val'; give train or test", id="split"),
         pytest.param(VIEWS + 'truth = "disp/*.png"\n', "no scale; truth is an image", id="no scale"),
         pytest.param(VIEWS + "scale = 0\n", "scale = 0", id="zero scale"),
-        pytest.param('left = "*/*.png"\nright = "right/*.png"\n', r"give one \*", id="two stars"),
+        pytest.param(
+            'left = "*/*.png"\nright = "right/*.png"\n',
+            r"orchard\.toml: left = '\*/\*\.png'; give one \*",
+            id="two stars",
+        ),
         pytest.param('left = "none/*.png"\nright = "right/*.png"\n', "no left view", id="nothing there"),
         pytest.param('left = "left/*.png"\nright = "scenes/*/im1.jpg"\n', "no right view for .*a.png", id="no pair"),
         pytest.param('left = "/data/*.png"\nright = "right/*.png"\n', "left = '/data/.*relative to", id="absolute"),
@@ -93,6 +103,29 @@ def test_a_bad_description_is_one_line(folder: Path, text: str, message: str) ->
     with pytest.raises(DatasetError, match=message) as refused:
         open_dataset(described(folder, text))
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("role", ["truth", "truth_right", "mask", "calib"])
+@pytest.mark.parametrize(
+    ("pattern", "told"),
+    [
+        pytest.param("none/*.pfm", "finds nothing", id="nothing there"),
+        pytest.param("none.pfm", "finds nothing", id="one file that is not there"),
+        pytest.param("disp/x*.pfm", "finds no scene but y, and the first one is a", id="files of other scenes"),
+    ],
+)
+def test_a_pattern_that_finds_nothing_of_any_scene_is_refused(folder: Path, role: str, pattern: str, told: str) -> None:
+    write_pfm(folder / "disp/xy.pfm", TRUTH)
+    others = "" if role == "truth" else 'truth = "disp/*.pfm"\n'
+    with pytest.raises(DatasetError, match=rf"orchard\.toml: {role} = '.*' {told}; correct the pattern"):
+        open_dataset(described(folder, f'{VIEWS}{others}{role} = "{pattern}"\nd_min = 0\nd_max = 5\n'))
+
+
+def test_a_truth_of_another_size_is_named(folder: Path) -> None:
+    write_pfm(folder / "disp/b.pfm", TRUTH[:2])
+    (_, scene) = open_dataset(described(folder, f'{VIEWS}truth = "disp/*.pfm"\n')).scenes
+    with pytest.raises(DatasetError, match=r"b\.pfm: truth of 2 x 8, but 3 x 8 is the images' size"):
+        scene.load_truth()
 
 
 def test_the_rendered_pair_as_a_description(stereo_data: Path, tmp_path: Path) -> None:

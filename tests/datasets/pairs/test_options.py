@@ -36,6 +36,18 @@ def test_any_name_of_a_file_survives(tmp_path: Path, name: str, monkeypatch: pyt
     assert len(sides) == 2
 
 
+@pytest.mark.parametrize(
+    ("argument", "told"),
+    [
+        ("l.png,r.png,foo=3", "foo is not known; known are calib, unit, d_min, "),
+        ("a,b.png,r.png", "3 paths; a path with a comma stands in double quotes; write pair:LEFT,RIGHT"),
+    ],
+)
+def test_too_many_parts_are_told(argument: str, told: str) -> None:
+    with pytest.raises(DatasetError, match=f"pair:{argument}: {told}"):
+        parse(argument)
+
+
 def test_a_message_about_such_a_file_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(DatasetError) as refused:
         open_dataset(pair_spec([str(tmp_path / "two\nlines.png")] * 2, PairOptions()))
