@@ -1,4 +1,4 @@
-"""Whether a map fits the two views as it was read, or would fit better upside down, in another scale or sign.
+"""Whether a map fits two views as they were read, or would fit better upside down, in another scale or sign.
 
 What a disparity leads to looks like its pixel. That is true for any matcher's map, and for a misread one it is not: on
 the training scenes another reading made the views differ at least as much as the map did, most of them twice as much.
@@ -34,25 +34,26 @@ def misreading(left: NDArray[np.uint8], right: NDArray[np.uint8], disparity: _Ma
     slopes = [np.gradient(view.astype(np.float32), axis=1) for view in (left, right)]
     own = _difference(slopes[0], slopes[1], disparity)
     others = {told: _difference(slopes[0], slopes[1], other) for told, other in _other_readings(disparity)}
-    others["belongs to the right view"] = _difference(slopes[1], slopes[0], -disparity)
+    others["it belongs to the right view"] = _difference(slopes[1], slopes[0], -disparity)
+    others["left and right are exchanged"] = _difference(slopes[1], slopes[0], disparity)
     told = min(others, key=lambda each: others[each])
     if not others[told] < CLOSER * own:
         return None
     return (
         f"the map does not fit the right view as it was read; the views differ {100 * (1 - others[told] / own):.0f} % "
-        f"less if it {told}"
+        f"less if {told}"
     )
 
 
 def _other_readings(disparity: _Map) -> Iterator[tuple[str, _Map]]:
     """Yield other readings of a map, and what each takes it for."""
-    yield "is turned upside down", disparity[::-1]
-    yield "is mirrored", disparity[:, ::-1]
-    yield "is turned by 180 degrees", disparity[::-1, ::-1]
+    yield "it is turned upside down", disparity[::-1]
+    yield "it is mirrored", disparity[:, ::-1]
+    yield "it is turned by 180 degrees", disparity[::-1, ::-1]
     if disparity.shape[0] == disparity.shape[1]:
-        yield "is transposed", disparity.T
+        yield "it is transposed", disparity.T
     for told, factor in _FACTORS.items():
-        yield f"is read so that its disparities {told}", disparity * np.float32(factor)
+        yield f"it is read so that its disparities {told}", disparity * np.float32(factor)
 
 
 def _difference(view: _Map, other: _Map, disparity: _Map) -> float:

@@ -46,5 +46,10 @@ def test_a_misread_map_is_told(misread: Callable[[np.ndarray], np.ndarray], told
     assert line is not None and told in line and "\n" not in line
 
 
+def test_views_that_were_exchanged_are_told() -> None:
+    line = misreading(RIGHT, LEFT, TRUE)
+    assert line is not None and line.endswith("less if left and right are exchanged")
+
+
 def test_a_map_without_any_disparity_is_left_alone() -> None:
     assert misreading(LEFT, RIGHT, np.full(TRUE.shape, np.nan, np.float32)) is None
