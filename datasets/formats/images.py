@@ -34,6 +34,7 @@ _DECODER_ERRORS = (OSError, EOFError, SyntaxError, ValueError, TypeError, Lookup
 """What Pillow's decoders raise on truncated or garbled files."""
 _ORIENTATION = 0x0112
 _PHOTOMETRIC, _WHITE_IS_ZERO = 0x0106, 0
+_SAMPLE_FORMAT, _SIGNED = 0x0153, 2
 _KIND, _OLD_KIND = 0x00FE, 0x00FF
 """What a page of a TIFF says of itself: bit 0, or 2 in the old tag, is a smaller version; bit 2 is a mask."""
 _EIGHT_BITS = 255
@@ -66,11 +67,13 @@ def read_image(path: str | os.PathLike[str]) -> ImageArray:
     Raises:
         MissingFileError: If there is no such file.
         ImageError: If the file is damaged, no image, above `MAX_PIXELS` (known before a pixel is decoded), holds
-            several images, or stores what would not survive: 16-bit colour, floats, CMYK and other colour spaces.
+            several images, or stores what would not survive: 16-bit colour, floats, signed 8-bit numbers, a PGM's
+            values above its own largest one, CMYK and other colour spaces.
     """
     path = Path(path)
     with _opened(path) as (file, image):
         orientation, mode = _orientation(image), _target_mode(path, image)
+        _check_largest(path, file, image)
         return _to_array(path, _upright(_decoded(path, file, image, mode), orientation))
 
 
@@ -152,6 +155,8 @@ def _target_mode(path: Path, image: ImageFile) -> str:
         _check_depth(path, image.mode, layout, rest if tile.codec_name.startswith("ppm") else [])
     if image.format == "TIFF" and image.mode.startswith("I") and image.getexif().get(_PHOTOMETRIC) == _WHITE_IS_ZERO:
         raise ImageError(f"{path}: 0 means white in this 16-bit TIFF; save it with 0 as black")
+    if image.format == "TIFF" and image.mode not in ("F", "I") and _is_signed(image):
+        raise ImageError(f"{path}: 8-bit values with a sign, which would wrap round; save it as unsigned 8 or 16 bits")
     if image.mode == "F":
         raise ImageError(
             f"{path}: pixels are F, floats whose range nothing tells; scale both views alike to 0..65535, save 16 bits"
@@ -159,6 +164,10 @@ def _target_mode(path: Path, image: ImageFile) -> str:
     if image.mode not in _CONVERSIONS:
         raise ImageError(f"{path}: pixels are {image.mode}; convert the image to gray or RGB")
     return _CONVERSIONS[image.mode]
+
+
+def _is_signed(image: ImageFile) -> bool:
+    return _SIGNED in np.atleast_1d(image.getexif().get(_SAMPLE_FORMAT, 1))
 
 
 def _only_previews(image: ImageFile) -> bool:
@@ -172,7 +181,25 @@ def _check_depth(path: Path, mode: str, layout: object, largest: list[object]) -
     # What Pillow is about to do is in the tile: it cuts 16-bit colour to 8 bits.
     deep = (isinstance(layout, str) and ";16" in layout) or any(int(str(value)) > _EIGHT_BITS for value in largest)
     if deep and not mode.startswith("I"):
-        raise ImageError(f"{path}: 16-bit colour would be cut to 8 bits; save it as 8-bit colour or 16-bit gray")
+        kind = "gray with alpha" if str(layout).startswith("LA") else "colour"
+        raise ImageError(
+            f"{path}: 16-bit {kind} would be cut to 8 bits; save it as 8-bit colour, or as 16-bit gray without alpha"
+        )
+
+
+def _check_largest(path: Path, file: BinaryIO, image: ImageFile) -> None:
+    """Refuse a binary PGM or PPM with values above the largest one that its header tells: Pillow clips them."""
+    for tile in image.tile:
+        if tile.codec_name == "ppm" and isinstance(tile.args, tuple):
+            largest = int(tile.args[-1])
+            file.seek(tile.offset)
+            kind = np.dtype(">u2" if largest > _EIGHT_BITS else np.uint8)
+            length = image.width * image.height * len(image.getbands()) * kind.itemsize
+            stored = np.frombuffer(file.read(length), kind)
+            if stored.max(initial=0) > largest:
+                raise ImageError(
+                    f"{path}: a value of {stored.max()}, but the header says that {largest} is the largest"
+                )
 
 
 def _decoded(path: Path, file: BinaryIO, header: ImageFile, mode: str) -> _Pixels:

@@ -15,6 +15,7 @@ from semidense.datasets.formats.limits import check_pixels
 
 _PHOTOMETRIC, _WHITE_IS_ZERO = 0x0106, 0
 _SAMPLE_FORMAT, _SIGNED = 0x0153, 2
+_BITS_PER_SAMPLE, _SHORT = 0x0102, 16
 
 
 def write_tiff(
@@ -47,7 +48,7 @@ def read_tiff(path: str | os.PathLike[str]) -> np.ndarray[tuple[int, ...], np.dt
     """Read a TIFF of one band of numbers.
 
     Returns:
-        (y, x): float32, int32, uint16 or uint8, as stored.
+        (y, x): float32, int32, int16, uint16 or uint8, as stored.
 
     Raises:
         MissingFileError: If there is no such file.
@@ -60,12 +61,13 @@ def read_tiff(path: str | os.PathLike[str]) -> np.ndarray[tuple[int, ...], np.dt
         with open_file(path) as file, Image.open(file, formats=["TIFF"]) as image:
             check_pixels(path, image.height, image.width, ImageError)
             tags = image.getexif()
-            signed = image.mode == "L" and _SIGNED in np.atleast_1d(tags.get(_SAMPLE_FORMAT, 1))
-            if signed or tags.get(_PHOTOMETRIC) == _WHITE_IS_ZERO:
+            signed = _SIGNED in np.atleast_1d(tags.get(_SAMPLE_FORMAT, 1))
+            if (signed and image.mode == "L") or tags.get(_PHOTOMETRIC) == _WHITE_IS_ZERO:
                 raise ImageError(f"{path}: values of 8 bits with a sign, or white as 0; save 32-bit floats or 16 bits")
             if len(image.getbands()) != 1 or getattr(image, "n_frames", 1) != 1:
                 raise ImageError(f"{path}: {len(image.getbands())} bands; a map is one band of one image")
-            return np.array(image)
+            values = np.array(image)  # 32 bits for 16 with a sign
+            return values.astype(np.int16) if signed and _SHORT in np.atleast_1d(tags[_BITS_PER_SAMPLE]) else values
     except UnidentifiedImageError as error:
         raise ImageError(f"{path}: no TIFF that can be read; save 32-bit floats without compression") from error
     except (OSError, ValueError, SyntaxError) as error:

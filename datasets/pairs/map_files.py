@@ -30,6 +30,8 @@ Stored = NDArray[Any]
 _OPENCV, _KITTI = 16.0, 256.0
 _WRAPPED = (65520, 65535)
 """What -16 and -1, OpenCV's and others' none, become in unsigned 16-bit integers."""
+_HUGE = 1e12
+"""Disparities, px, that no scale and no none explains, but bytes that were read in the wrong order do."""
 _LEAST_SHARE, _LARGEST_SHARE = 0.01, 0.6
 """A map's largest disparity, as a share of the image's width, if the scale that was guessed is right."""
 
@@ -101,9 +103,11 @@ def disparities(what: str, stored: Stored, reading: Reading, signed: bool = True
     """
     scale = reading.scale or 1.0
     known = ~np.ma.getmaskarray(stored)
-    values = np.full(stored.shape, np.nan, np.float32)
-    values[known] = _meant(np.ma.getdata(stored)[known], scale, reading.none)
-    _require_possible(what, values)
+    scaled = np.full(stored.shape, np.nan)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is too large is refused below
+        scaled[known] = _meant(np.ma.getdata(stored)[known], scale, reading.none)
+    _require_possible(what, scaled)
+    values = scaled.astype(np.float32)
     if not signed and np.nanmedian(values) < 0:
         raise DatasetError(
             f"{what}: most disparities are negative (median {np.nanmedian(values):.3g} px), and a right pixel lies at "
@@ -206,15 +210,16 @@ def _is_apart(positive: Stored, scale: float) -> bool:
     return bool(len(positive)) and bool(positive[0] > abs(scale))
 
 
-def _require_possible(what: str, values: DisparityMap) -> None:
+def _require_possible(what: str, values: Stored) -> None:
     """Refuse a map that no image can have."""
-    known = values[np.isfinite(values)]
+    known = values[~np.isnan(values)]
     if not known.size:
         raise DatasetError(f"{what}: no pixel has a disparity")
     if not known.any():
         raise DatasetError(f"{what}: all disparities are 0, as in a map that nobody filled")
-    if np.abs(known).max() >= values.shape[1]:
+    if (largest := np.abs(known).max()) >= values.shape[1]:
+        order = ", or the file has the other byte order" if largest > _HUGE else ""
         raise DatasetError(
-            f"{what}: a disparity of {np.abs(known).max():.6g} px in an image of {values.shape[1]} px; give the stored "
-            "value of 1 px (OpenCV: scale=16, KITTI: scale=256) and the one that means none (such as none=-1)"
+            f"{what}: a disparity of {largest:.6g} px in an image of {values.shape[1]} px; give the stored value of 1 "
+            f"px (OpenCV: scale=16, KITTI: scale=256) and the one that means none (such as none=-1){order}"
         )

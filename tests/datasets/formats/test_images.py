@@ -232,10 +232,18 @@ BAD_IMAGES = [
     pytest.param(encode(Image.new("I", (2, 2), 70000), "TIFF"), "do not fit 16 bits", id="32-bit gray"),
     pytest.param(png(2, 16, 2, 1, b"\0" + bytes(12)), "16-bit colour", id="16-bit RGB would lose 8 bits"),
     pytest.param(png(6, 16, 2, 1, b"\0" + bytes(16)), "16-bit colour", id="16-bit RGBA"),
-    pytest.param(png(4, 16, 2, 1, b"\0" + bytes(8)), "16-bit colour", id="16-bit gray with alpha"),
+    pytest.param(
+        png(4, 16, 2, 1, b"\0" + bytes(8)), "16-bit gray with alpha would be cut", id="16-bit gray with alpha"
+    ),
+    pytest.param(
+        b"P5\n1 2\n1023\n\x03\xff\x04\x00", "1024, but the header says that 1023 is the largest", id="10-bit PGM"
+    ),
+    pytest.param(b"P5\n1 2\n100\n\x64\x65", "101, but the header says that 100 is the largest", id="7-bit PGM"),
+    pytest.param(b"P6\n1 1\n100\n\x64\x65\x00", "101, but the header says that 100 is the largest", id="7-bit PPM"),
     pytest.param(b"P6\n1 1\n65535\n" + bytes(6), "16-bit colour", id="16-bit PPM would lose 8 bits"),
     pytest.param(b"P3\n1 1\n1023\n1 2 3\n", "16-bit colour", id="10-bit PPM in plain text"),
     pytest.param(b"P5\n1 1\n70000\n" + bytes(4), "damaged image", id="a largest value that PGM does not have"),
+    pytest.param(encode(Image.fromarray(GRAY), "TIFF", tiffinfo={339: 2}), "with a sign", id="signed 8-bit gray"),
     pytest.param(encode(Image.fromarray(DEEP), "TIFF", tiffinfo={262: 0}), "0 means white", id="16-bit negative"),
     pytest.param(animation(), "holds 2 images", id="several images in one file"),
     pytest.param(png(0, 8, 9000, 9000, b"\0"), "9000 x 9000 = 81,000,000 pixels", id="above the limit"),

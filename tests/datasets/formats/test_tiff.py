@@ -29,6 +29,22 @@ def test_what_is_no_map_is_refused_and_leaves_nothing(tmp_path: Path, bad: np.nd
 
 
 @pytest.mark.parametrize(
+    ("values", "byte_order"),
+    [
+        pytest.param(np.int16([[-16, 0, 32767], [-32768, 1, 7]]), "<", id="16 bits with a sign"),
+        pytest.param(np.int16([[-16, 0, 32767], [-32768, 1, 7]]), ">", id="16 bits with a sign, big-endian"),
+        pytest.param(np.uint16([[0, 65520, 65535]]), "<", id="16 bits without a sign"),
+        pytest.param(np.int32([[-16, 0, 70000]]), "<", id="32 bits with a sign"),
+    ],
+)
+def test_whole_numbers_keep_their_type(tmp_path: Path, values: np.ndarray, byte_order: str) -> None:
+    tifffile.imwrite(tmp_path / "map.tif", values, byteorder=byte_order)
+    found = read_tiff(tmp_path / "map.tif")
+    assert found.dtype == values.dtype
+    np.testing.assert_array_equal(found, values)
+
+
+@pytest.mark.parametrize(
     ("values", "options"),
     [
         pytest.param(np.int8([[9, -1, -7]]), {}, id="a sign"),

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 from PIL import Image
 
 from semidense.datasets import write_pfm, write_png16
@@ -22,6 +23,8 @@ def save(folder: Path, name: str, stored: np.ndarray) -> Path:
     path = folder / name
     if path.suffix == ".npy":
         np.save(path, stored)
+    elif stored.dtype == np.int16:
+        tifffile.imwrite(path, stored)
     else:
         Image.fromarray(stored).save(path)
     return path
@@ -55,6 +58,7 @@ def opencv(value: int = -16) -> np.ndarray:
         pytest.param("a.png", as_none(0, 4).astype(np.uint8), Reading(scale=4), id="Middlebury's 8 bits"),
         pytest.param("a.tiff", TRUE, Reading(), id="float TIFF"),
         pytest.param("a.tif", as_none(0, 256).astype(np.uint16), Reading(), id="16-bit TIFF"),
+        pytest.param("a.tif", opencv(), Reading(), id="OpenCV's 16-bit numbers in a TIFF"),
     ],
 )
 def test_it_is_read_right(name: str, stored: np.ndarray, reading: Reading, tmp_path: Path) -> None:
@@ -97,6 +101,10 @@ def test_zero_and_negative_disparities_are_kept(tmp_path: Path) -> None:
         pytest.param("a.npy", np.full((4, 9), N), Reading(), "no pixel has a disparity", id="nothing known"),
         pytest.param("a.npy", np.zeros((4, 9), np.float32), Reading(), "all disparities are 0", id="never filled"),
         pytest.param("a.npy", as_none(1e6), Reading(), "1e.06 px in an image of 120 px.*none=", id="large none"),
+        pytest.param("a.npy", np.float64([[1e300, 2, 3]]), Reading(), "1e.300 px .*other byte order", id="huge"),
+        pytest.param(
+            "a.npy", (TRUE * np.float32(1.013)).byteswap(), Reading(), "the file has the other byte order", id="bytes"
+        ),
         pytest.param("a.npy", np.zeros((4, 9, 3)), Reading(), r"\(rows, columns\) of numbers", id="three bands"),
         pytest.param("a.npy", np.zeros((4, 9), bool), Reading(), r"\(rows, columns\) of numbers", id="a mask"),
         pytest.param("a.png", np.zeros((4, 9, 3), np.uint8), Reading(), r"\(rows, columns\)", id="a picture"),
