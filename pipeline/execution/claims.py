@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from semidense.cache import Claim, Lease, Store
+from semidense.cache.owner import describe, owner
 from semidense.pipeline.plan.errors import PipelineError
 
 SHORTEST, LONGEST = 0.01, 0.25
@@ -97,8 +98,13 @@ class LocalClaims(Claims):
             pause = min(2 * pause, LONGEST)
             if not told and pause >= LONGEST:
                 told = True
-                waiting(self._store.claimant(key) or "another process")
+                waiting(self._holder(key))
         return claim
+
+    def _holder(self, key: str) -> str:
+        """Return who makes a product; scenes of one run share products that have the same inputs."""
+        holder = self._store.claimant(key)
+        return "an equal scene of this run" if holder == describe(owner()) else holder or "another process"
 
     @contextmanager
     def opening(self) -> Iterator[None]:

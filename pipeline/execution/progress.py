@@ -93,7 +93,7 @@ class ProgressWatch:
         return Compiling(lambda: self._console.print("compiling loops, once a machine: later runs begin at once"))
 
     def waiting(self, step: Step, holder: str) -> None:
-        """Say that another process is making the product."""
+        """Say that another process, or an equal scene of this run, is making the product."""
         self._console.print(
             f"{step.name}: waiting for {holder}, which is making it", highlight=False, soft_wrap=True, markup=False
         )

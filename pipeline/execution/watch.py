@@ -20,7 +20,7 @@ class Watch(Protocol):
         """A product is being made, in so many tiles."""
 
     def waiting(self, step: Step, holder: str) -> None:
-        """Another process is making the product: this run waits for it."""
+        """Another process, or an equal scene of this run, is making the product: ``holder`` says which."""
 
     def advanced(self, step: Step, done: int, total: int, note: str) -> None:
         """A tile, or a training step, is done."""
