@@ -9,12 +9,16 @@ from semidense.datasets.formats.atomic import atomic_write
 from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.figures import density_figure, dots_figure, sheets
 from semidense.pipeline.comparison.tables import TITLES, at, of, quoted
-from semidense.pipeline.files.publishing import publishing
-from semidense.pipeline.files.writing import explaining, save_png, table_text
+from semidense.pipeline.files.publishing import publishing, refuse_foreign
+from semidense.pipeline.files.writing import explaining, require_writable, save_png, table_text
 from semidense.pipeline.results.metric_rows import FIGURES, THRESHOLD
 
 COLUMNS = ("experiment", "scene", "method", "mask", "threshold_px", "R", *FIGURES, "quoted", "data")
 """The columns of ``comparison.csv``."""
+_RECORD = "comparison.json"
+_TABLES = ("comparison.csv", _RECORD)
+_PICTURES = ("raw.png", "auc.png", "density.png", "lighting.png", "texture.png")
+"""The figures, of which a comparison writes those of its experiments."""
 
 
 def as_json(found: Comparison, files: Iterable[Path] = ()) -> dict[str, Any]:
@@ -34,8 +38,20 @@ def as_json(found: Comparison, files: Iterable[Path] = ()) -> dict[str, Any]:
     }
 
 
+def require_place(folder: Path, experiments: Iterable[str]) -> None:
+    """Refuse a folder that cannot be written, without making it: comparing takes long.
+
+    Raises:
+        UsageError: as ``write_comparison``.
+    """
+    require_writable(folder)
+    refuse_foreign(folder, _RECORD, {*_TABLES, *(f"{experiment}.png" for experiment in experiments)})
+
+
 def write_comparison(found: Comparison, folder: Path, threshold: float = THRESHOLD) -> list[Path]:
     """Write ``comparison.csv``, ``comparison.json`` and the figures; return their paths.
+
+    Figures of an earlier comparison in this folder that this one does not draw are deleted.
 
     Args:
         found: the comparison.
@@ -46,8 +62,8 @@ def write_comparison(found: Comparison, folder: Path, threshold: float = THRESHO
         UsageError: if the folder cannot be written, or holds a file of these names that no earlier comparison wrote.
     """
     figures = _figures(found, threshold)
-    names = ["comparison.csv", "comparison.json", *figures]
-    with publishing(folder, "comparison.json") as draft:
+    names = [*_TABLES, *figures]
+    with publishing(folder, _RECORD, obsolete=_PICTURES) as draft:
         for name, drawn in figures.items():
             save_png(drawn, draft / name)
         _write(draft / "comparison.csv", table_text([*found.rows, *found.means, *quoted(found)], COLUMNS))

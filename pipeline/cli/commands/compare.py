@@ -97,7 +97,6 @@ def compare(
     from semidense.pipeline.comparison.experiments import carry_out_comparison
     from semidense.pipeline.comparison.prepared import EXPERIMENTS, prepare
     from semidense.pipeline.execution.progress import ProgressWatch
-    from semidense.pipeline.files.writing import require_writable
     from semidense.pipeline.plan.errors import UsageError
     from semidense.stages.metrics.errors import THRESHOLDS
 
@@ -112,7 +111,7 @@ def compare(
     store = api.open_store(cache)
     if dry_run:
         return console.show_plan(prepared.plan(), store, as_json)
-    require_writable(output)
+    comparison_report.require_place(output, prepared.experiments)
     with ProgressWatch(console.announce, verbose - quiet) as watch:
         watch.expect(prepared.plan(), store)
         found = carry_out_comparison(prepared, watch=watch, scheduler=scheduler, workers=workers)

@@ -1,16 +1,23 @@
-"""The tables of a comparison in terminals of different widths."""
+"""The files of a comparison, and its tables in terminals of different widths."""
 
 import io
 import re
 from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 from rich.console import Console
 
+from semidense.cache import Store
+from semidense.pipeline.comparison import files
 from semidense.pipeline.comparison.ablation import ABLATION
+from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.methods import LOWERED, MATCHERS
 from semidense.pipeline.comparison.tables import _DENSITY, _SPARE, _by_scene, _density_table
+from semidense.pipeline.plan.errors import UsageError
+from semidense.pipeline.plan.plan import Plan
 from semidense.pipeline.results.metric_rows import FIGURES, METHOD
+from semidense.pipeline.results.result import Result
 from semidense.pipeline.results.text import print_table
 
 SCENES = ("Motorcycle", "MotorcycleE", "Piano", "PianoL", "Pipes", "Playroom", "Shelves", "Teddy")
@@ -78,3 +85,25 @@ def test_names_stand_whole_where_there_is_room() -> None:
     lines = printed(240)
     assert all(any(line.startswith(method) for line in lines) for method in METHODS)
     assert all(method in printed(240, FEW)[1] for method in FEW)
+
+
+def comparison(experiment: str, store: Store) -> Comparison:
+    """A comparison with one row of one experiment."""
+    figures = {"pixels": 9, "raw_bad": 20.0, "auc": 0.1, "bad": 2.0, "invalid": 30.0}
+    row = {"scene": "Teddy", "method": METHOD, "mask": "nonocc", "threshold_px": 1.0, "experiment": experiment}
+    return Comparison([row | figures], [], (), Result(Plan((), ()), {}, store, []))
+
+
+def test_a_folder_is_used_again_by_other_experiments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "sheets", lambda _: {})
+    for experiment in ("raw", "auc", "raw"):
+        written = files.write_comparison(comparison(experiment, Store(tmp_path / "cache")), tmp_path / "out")
+        assert {path.name for path in written} == {"comparison.csv", "comparison.json", f"{experiment}.png"}
+        assert set(written) == set((tmp_path / "out").iterdir())
+
+
+def test_a_picture_of_somebody_else_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
+    (tmp_path / "raw.png").write_text("mine")
+    files.require_place(tmp_path, ["auc"])
+    with pytest.raises(UsageError, match=r"raw\.png: this file was not written by an earlier command"):
+        files.require_place(tmp_path, ["raw"])
