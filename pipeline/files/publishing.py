@@ -8,7 +8,7 @@ import json
 import secrets
 import shutil
 from collections.abc import Collection, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -54,8 +54,10 @@ def _publish(draft: Path, folder: Path, record: str, inputs: Collection[Path], o
     for name in sorted(names - {record}):
         (folder / name).parent.mkdir(exist_ok=True)
         (draft / name).replace(folder / name)
-    for name in sorted((earlier & obsolete) - names):
-        (folder / name).unlink(missing_ok=True)
+    for path in (folder / name for name in sorted((earlier & obsolete) - names)):
+        path.unlink(missing_ok=True)
+        with suppress(OSError):
+            path.parent.rmdir()  # of a scene, once it is empty
     (draft / record).replace(folder / record)
 
 

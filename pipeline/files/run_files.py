@@ -17,8 +17,9 @@ Where the variants of a sweep differ in a file's content, the settings that it d
 """
 
 import json
+import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,8 @@ COLUMNS = ("scene", "method", "mask", "threshold_px", "R", "pixels", *ROW)
 CONFIG = "config.json"
 """The record of an export."""
 _MAPS = ("disparity", "confidence", "semidense")
+_EXPORTED = re.compile(r"metrics\.csv|[^/.][^/]*(\.safetensors|/(disparity|confidence)[^/]*(\.pfm|-colour\.png))")
+"""Names of files that an export writes beside its record: no record makes it delete others."""
 _LAST = 50
 """Training steps that the final loss is a mean of."""
 _Span = tuple[float, float]
@@ -52,6 +55,8 @@ _Span = tuple[float, float]
 
 def export(result: Result, folder: Path) -> list[Path]:
     """Write the results of a run into a folder, all of them or nothing; those of an earlier export are replaced.
+
+    Files of an earlier export that this one does not write are deleted: ``config.json`` is true of all that is there.
 
     Args:
         result: of a run or a sweep. Scenes that were only trained on are left out.
@@ -67,12 +72,13 @@ def export(result: Result, folder: Path) -> list[Path]:
         CacheError: if a result is no longer in the cache.
     """
     folder = Path(folder)
-    with publishing(folder, CONFIG, _read_files(result)) as draft:
+    earlier = {name for name in written_before(folder, CONFIG) if _EXPORTED.fullmatch(name)}
+    with publishing(folder, CONFIG, _read_files(result), earlier) as draft:
         exporter = _Exporter(result, draft)
         exporter.write_networks()
         exporter.write_maps()
         exporter.write_metrics()
-        exporter.write_config(written_before(folder, CONFIG))
+        exporter.write_config()
     return [folder / path.relative_to(draft) for path in exporter.written]
 
 
@@ -134,10 +140,10 @@ class _Exporter:
             write_rows(self.result.metrics, path)
             self.written.append(path)
 
-    def write_config(self, earlier: Iterable[str]) -> None:
-        """Write the command, the versions, the settings that each result was made with, and all files there are."""
+    def write_config(self) -> None:
+        """Write the command, the versions, the settings that each result was made with, and the names of the files."""
         targets = [self._described(*target) for target in self.result.plan.targets]
-        files = {path.relative_to(self.folder).as_posix() for path in self.written} | {*earlier, CONFIG}
+        files = {path.relative_to(self.folder).as_posix() for path in self.written} | {CONFIG}
         settings = {"preset": self.result.preset, "configuration": targets}
         document = provenance(sys.argv) | settings | {"files": sorted(files)}
         self._write(self.folder / CONFIG, (json.dumps(document, indent=2) + "\n").encode())

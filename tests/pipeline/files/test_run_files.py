@@ -311,6 +311,37 @@ def test_files_are_replaced_and_nothing_is_left_beside_them(run: Run, tmp_path: 
     assert len([path for path in out.rglob("*") if path.is_file()]) == 7
 
 
+def test_what_an_earlier_run_wrote_and_this_one_does_not_is_deleted(run: Run, tmp_path: Path) -> None:
+    nets, out = run.nets(), tmp_path / "out"
+    for scene in ("Teddy", "Cones"):
+        run.target(run.scene(scene, *nets), 0.5)
+    run.rows.append(row())
+    export(run.result(), out)
+    (out / "Cones" / "notes.txt").write_text("mine")
+    (out / "Teddy" / "disparity.pfm").unlink()  # somebody tidied up
+    run.rows.clear()
+    run.targets.clear()
+    run.target(run.scene("Pipes", *nets), 0.5)
+    written = export(run.result(), out)
+    there = {path for path in out.rglob("*") if path.is_file()}
+    assert there == {*written, out / "Cones" / "notes.txt"}
+    assert not (out / "Teddy").exists()
+    assert set(json.loads((out / "config.json").read_text())["files"]) == set(names(written, out))
+
+
+@pytest.mark.parametrize("name", ["../confidence.pfm", "thesis.pfm", "a/../../disparity.pfm"])
+def test_a_record_makes_an_export_delete_nothing_that_it_never_writes(run: Run, tmp_path: Path, name: str) -> None:
+    run.target(run.scene("Teddy", *run.nets()), 0.5)
+    out = tmp_path / "out"
+    out.mkdir()
+    mine = out / "a" / ".." / name
+    (out / "a").mkdir()
+    mine.write_text("mine")
+    (out / "config.json").write_text(json.dumps({"files": [name]}))
+    export(run.result(), out)
+    assert mine.read_text() == "mine"
+
+
 def test_a_folder_is_made_and_left_empty(tmp_path: Path) -> None:
     writable_folder(tmp_path / "a" / "b")
     assert list((tmp_path / "a" / "b").iterdir()) == []
