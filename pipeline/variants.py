@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from semidense.pipeline.plan.arguments import require_number, texts
-from semidense.pipeline.plan.config import alternatives, value_text
+from semidense.pipeline.plan.config import alternatives, parse_setting, value_text
 from semidense.pipeline.plan.errors import UsageError, shortened
 
 Thresholds = str | float | Iterable[float]
@@ -19,7 +19,7 @@ def variants_of(R: Thresholds, over: Swept) -> list[tuple[str, ...]]:
     """Return the settings of each variant, as texts: a threshold, and a value of each setting that is swept.
 
     Raises:
-        UsageError: if a threshold is none, R is swept in two ways, or a setting has no value to try.
+        UsageError: if a threshold is none, R is swept in two ways, or a setting is given twice or has no value to try.
 
     >>> variants_of("0.1,0.2", {"channels.rank_window": 15})
     [('semidense.R=0.1', 'channels.rank_window=15'), ('semidense.R=0.2', 'channels.rank_window=15')]
@@ -31,12 +31,24 @@ def variants_of(R: Thresholds, over: Swept) -> list[tuple[str, ...]]:
 
 
 def _combined(over: Swept) -> list[list[str]]:
-    """Return each swept setting as one text a value."""
+    """Return each swept setting as one text a value.
+
+    Raises:
+        UsageError: if a setting is given twice: of two values of it, a variant would have the later one alone.
+    """
     if isinstance(over, Mapping):
         return [
             [f"{name}={value_text(name, value)}" for value in _several(name, values)] for name, values in over.items()
         ]
-    return [alternatives(setting) for setting in texts("over", over)]
+    settings = texts("over", over)
+    given: dict[str, str] = {}
+    for setting in settings:
+        section, field, values = parse_setting(setting)
+        if (name := f"{section}.{field}") in given:
+            together = f"{name}={given[name]},{values}"
+            raise UsageError(f"{name} is given twice; a sweep takes all values of a setting at once: {together}")
+        given[name] = values
+    return [alternatives(setting) for setting in settings]
 
 
 def _several(name: str, values: object) -> list[object]:

@@ -54,6 +54,17 @@ def test_what_a_sweep_cannot_sweep_is_refused() -> None:
     assert len(sweep_request(task, 0.9, {"semidense.density": [0.5, 0.6]}).configs) == 2
 
 
+def test_a_setting_that_is_swept_twice_is_refused() -> None:
+    twice = ["confidence.window=5,25", "disparity.subpixel=false", "confidence.window=41"]
+    with pytest.raises(UsageError, match=r"window is given twice.*at once: confidence\.window=5,25,41$"):
+        sweep_request(Task(SPEC, train=True), 0.5, twice)
+
+
+def test_of_a_setting_that_a_run_is_given_twice_the_later_value_wins() -> None:
+    config = Task(SPEC, settings=["confidence.window=5", "confidence.window=41"]).configuration()
+    assert config.to_dict()["confidence"]["window"] == 41
+
+
 def test_a_product_of_training_scenes_needs_some(tmp_path: Path) -> None:
     for product in ("matching_samples", "o1", "ccnn"):
         with pytest.raises(UsageError, match="is made from training scenes, and there are none here: add --train"):

@@ -92,7 +92,9 @@ def sweep(
     settings: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", help="Try several values of a setting: section.field=value1,value2; all combinations are made."
+            "--set",
+            help="Try several values of a setting: section.field=value1,value2; repeat the option for other settings: "
+            "all combinations are made.",
         ),
     ] = None,
     preset: PresetOption = None,
