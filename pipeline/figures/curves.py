@@ -1,6 +1,6 @@
 """Draw error against invalid pixels: the two as the threshold on the confidence grows."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import cycle
 from typing import Any
 
@@ -25,6 +25,8 @@ _COLUMNS = 64
 """Characters in a line of the legend."""
 _DASHES = ("-", "--", ":", "-.")
 _MARKERS = "sD^vPX*"
+_SHAPES = "o" + _MARKERS
+"""Shapes of the dots of each family: each set of settings other than R."""
 
 
 def error_curve_figure(
@@ -45,12 +47,14 @@ def error_curve_figure(
         mask: ``nonocc`` or ``all``.
         threshold: px, error above which a pixel is wrong.
         others: a row a matcher that becomes a point, with ``method``, ``invalid`` and ``bad`` over the same scenes.
-        marked: values of R that are written beside the curve; None takes a few that are spread evenly.
+        marked: values of R that are dots on the curve of each family of settings, and are written beside the first
+            one; None takes a few that are spread evenly.
 
     Returns:
         A figure: x is the percentage of invalid pixels, y the percentage of wrong ones among the reported. The
         mean is drawn where every scene of it reports something; some values of R are written beside it. A curve ends
-        where a scene reports fewer than one pixel in a hundred: the error of a handful of pixels is chance.
+        where a scene reports fewer than one pixel in a hundred: the error of a handful of pixels is chance. If all
+        rows have the same R, it stands in the title, each curve is one dot, and the axes show the dots' surroundings.
 
     Raises:
         UsageError: if no row is left.
@@ -61,16 +65,16 @@ def error_curve_figure(
     drawn = {name: points for name, of in curves.items() if (points := _points(of))}
     if not drawn:
         raise UsageError(f"no row has an R, the mask {mask} and the threshold {threshold:g} px: nothing to draw")
-    figure = new_figure(title)
+    values = {R for curve in drawn.values() for R in curve}
+    lone = values.pop() if len(values) == 1 else None
+    figure = new_figure(title if lone is None else f"{title}, R = {lone:g}")
     axes = figure.subplots()
-    styles = cycle([(colour, dash) for dash in _DASHES for colour in LINES])
-    for name, curve in drawn.items():
-        colour, dash = next(styles)
-        dots = "." if len(curve) <= _DOTS else None
-        _draw(axes, curve, name, color=colour, linestyle=dash, linewidth=1.4, marker=dots)
-    _draw_means(axes, chosen, marked)
+    if lone is None:
+        _draw_means(axes, chosen, marked, _draw_curves(axes, drawn))
+    else:
+        _draw_dots(axes, chosen)
     draw_matchers(axes, [{**row, "method": f"{row['method']} (other matcher)"} for row in others])
-    _label(axes, mask, threshold)
+    _label(axes, mask, threshold, from_zero=lone is None)
     figure.set_size_inches(_WIDTH, _HEIGHT + _LINE * _legend(figure, axes))
     return figure
 
@@ -99,22 +103,62 @@ def _named(what: str, row: Row) -> str:
     return f"{what}, {family}" if (family := _family(row)) else what
 
 
-def _draw_means(axes: Axes, rows: Iterable[Row], marked: Sequence[float] | None) -> None:
-    """Draw the mean of each family of several scenes, and write R beside it, or beside a family's only curve."""
-    for dash, family in zip(cycle(_DASHES), _by(rows, _family).values(), strict=False):
-        scenes = len({row["scene"] for row in family})
-        over = mean_name(scenes)
-        mean = _points(row for row in mean_rows(family) if row["scene"] == over)
-        if scenes > 1 and mean:
-            style = {"color": "black", "linestyle": dash, "linewidth": 2.6}
-            _draw(axes, mean, _named(f"{over} scenes", family[0]), **style)
-        _write_thresholds(axes, mean, _spread(mean) if marked is None else [R for R in marked if R in mean])
+def _draw_curves(axes: Axes, curves: Mapping[str, Curve]) -> dict[str, str]:
+    """Draw a line a curve; return their colours by name."""
+    styles = cycle([(colour, dash) for dash in _DASHES for colour in LINES])
+    colours: dict[str, str] = {}
+    for name, curve in curves.items():
+        colours[name], dash = next(styles)
+        dots = "." if len(curve) <= _DOTS else None
+        _draw(axes, curve, name, color=colours[name], linestyle=dash, linewidth=1.4, marker=dots)
+    return colours
+
+
+def _draw_means(axes: Axes, rows: Iterable[Row], marked: Sequence[float] | None, colours: Mapping[str, str]) -> None:
+    """Draw the mean of each family of several scenes, and dots at some R on it, or on a family's only curve.
+
+    R is written beside the dots of the first family; those of the others have another shape.
+    """
+    told = True
+    for dash, shape, family in zip(cycle(_DASHES), cycle(_SHAPES), _by(rows, _family).values(), strict=False):
+        over, mean = _mean_curve(family)
+        colour = colours.get(_named(str(family[0]["scene"]), family[0])) if over is None else "black"
+        if over and mean:
+            _draw(axes, mean, over, color=colour, linestyle=dash, linewidth=2.6)
+        thresholds = _spread(mean) if marked is None else [R for R in marked if R in mean]
+        for R in thresholds:
+            axes.scatter(*mean[R], color=colour, marker=shape, edgecolor="black", linewidth=0.6, s=30, zorder=6)
+            if told:
+                _write_threshold(axes, mean[R], R)
+        told = told and not thresholds
+
+
+def _draw_dots(axes: Axes, rows: Sequence[Row]) -> None:
+    """Draw rows of one R: a shape a family, a colour a scene, and the mean of several in black."""
+    several = len({row["scene"] for row in rows}) > 1
+    colours = dict(zip(dict.fromkeys(row["scene"] if several else _family(row) for row in rows), cycle(LINES)))
+    for shape, (name, family) in zip(cycle(_SHAPES), _by(rows, _family).items(), strict=False):
+        style = {"linestyle": "none", "marker": shape, "markeredgecolor": "black"}
+        for row in family:
+            colour = colours[row["scene"] if several else name]
+            _draw(axes, _points([row]), _named(str(row["scene"]), row), color=colour, markersize=7, **style)
+        over, mean = _mean_curve(family)
+        if over:
+            _draw(axes, mean, over, color="black", markersize=10, **style)
+
+
+def _mean_curve(family: Sequence[Row]) -> tuple[str | None, Curve]:
+    """Return the name of a family's mean over several scenes, None of one scene, and its points."""
+    scenes = len({row["scene"] for row in family})
+    mean = _points(row for row in mean_rows(family) if row["scene"] == mean_name(scenes))
+    return _named(f"{mean_name(scenes)} scenes", family[0]) if scenes > 1 else None, mean
 
 
 def _draw(axes: Axes, curve: Curve, label: str, **style: Any) -> None:  # noqa: ANN401
-    invalid, bad = zip(*curve.values(), strict=True)
-    (line,) = axes.plot(invalid, bad, **style)
-    line.set_label(label)
+    """Draw a curve under its name; one without a point is left out."""
+    if curve:
+        (line,) = axes.plot(*zip(*curve.values(), strict=True), **style)
+        line.set_label(label)
 
 
 def _spread(curve: Curve) -> list[float]:
@@ -124,15 +168,13 @@ def _spread(curve: Curve) -> list[float]:
     return [thresholds[index] for index in np.unique(places.round().astype(int))]
 
 
-def _write_thresholds(axes: Axes, curve: Curve, thresholds: Iterable[float]) -> None:
-    """Mark values of R on a curve, and write them beside it: to the left of it in the right half of the axes."""
+def _write_threshold(axes: Axes, point: tuple[float, float], R: float) -> None:
+    """Write R beside a dot: to the left of it in the right half of the axes."""
     box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
-    for R in thresholds:
-        at_left = curve[R][0] > 50
-        style: dict[str, Any] = {"textcoords": "offset points", "fontsize": "small", "fontweight": "bold"}
-        style |= {"xytext": (-6 if at_left else 6, 8), "ha": "right" if at_left else "left"}
-        axes.scatter(*curve[R], color="black", s=22, zorder=4)
-        axes.annotate(f"R = {R:g}", curve[R], bbox=box, zorder=5, **style)
+    at_left = point[0] > 50
+    style: dict[str, Any] = {"textcoords": "offset points", "fontsize": "small", "fontweight": "bold"}
+    style |= {"xytext": (-6 if at_left else 6, 8), "ha": "right" if at_left else "left"}
+    axes.annotate(f"R = {R:g}", point, bbox=box, zorder=5, **style)
 
 
 def draw_matchers(axes: Axes, means: Iterable[Row]) -> None:
@@ -148,12 +190,15 @@ def draw_matchers(axes: Axes, means: Iterable[Row]) -> None:
         axes.plot(row["invalid"], row["bad"], marker, label=row["method"], **style)
 
 
-def _label(axes: Axes, mask: str, threshold: float) -> None:
+def _label(axes: Axes, mask: str, threshold: float, *, from_zero: bool) -> None:
     axes.set_xlabel(f"invalid: {mask} pixels that are not kept (%)")
     axes.set_ylabel(f"bad: kept {mask} pixels off by more than {threshold:g} px (%)")
-    axes.margins(x=0.04, y=0.1)  # room for what is written beside the curve
-    axes.set_ylim(bottom=0)
-    axes.set_xlim(left=-1)
+    if from_zero:
+        axes.margins(x=0.04, y=0.1)  # room for what is written beside the curve
+        axes.set_ylim(bottom=0)
+        axes.set_xlim(left=-1)
+    else:
+        axes.margins(0.15)
     axes.grid(alpha=0.3)
 
 

@@ -1,6 +1,7 @@
 from typing import Any
 
 import pytest
+from matplotlib.colors import to_hex
 
 from semidense.pipeline.figures.curves import error_curve_figure
 from semidense.pipeline.plan.errors import UsageError
@@ -86,6 +87,38 @@ def test_chosen_thresholds_are_written_and_another_matcher_is_named_as_one() -> 
     figure = error_curve_figure(ROWS, marked=(0.5, 0.9), others=[other])
     assert [text.get_text() for text in figure.axes[0].texts] == ["R = 0.9"]
     assert figure.legends[0].get_texts()[-1].get_text() == "SGM (other matcher)"
+
+
+def of_windows(scenes: str, thresholds: tuple[float, ...]) -> list[dict[str, Any]]:
+    return [
+        row(scene, R, 40 * R + place, window / 10 - R, variant=f"semidense.R={R}, channels.rank_window={window}")
+        for place, scene in enumerate(scenes)
+        for window in (15, 31)
+        for R in thresholds
+    ]
+
+
+@pytest.mark.parametrize("scenes", ["a", "ab"])
+def test_of_one_threshold_the_title_tells_it_and_variants_differ_in_shape(scenes: str) -> None:
+    figure = error_curve_figure(of_windows(scenes, (0.9,)))
+    axes = figure.axes[0]
+    assert figure.get_suptitle() == "Error versus invalid pixels, R = 0.9"
+    assert [*axes.texts, *axes.collections] == []
+    looks = {(line.get_marker(), line.get_color()) for line in axes.lines}
+    assert len(looks) == len(axes.lines) == (2 if scenes == "a" else 6)
+    assert len({marker for marker, _ in looks}) == 2
+
+
+@pytest.mark.parametrize("scenes", ["a", "ab"])
+def test_of_several_variants_one_has_its_thresholds_written(scenes: str) -> None:
+    axes = error_curve_figure(of_windows(scenes, (0.1, 0.9))).axes[0]
+    assert [text.get_text() for text in axes.texts] == ["R = 0.1", "R = 0.9"]
+    assert len(axes.collections) == 4
+    lines = axes.lines[-2:]
+    for dots, line in zip(axes.collections, [lines[0]] * 2 + [lines[1]] * 2, strict=True):
+        assert to_hex(dots.get_facecolor()[0]) == to_hex(line.get_color())
+        assert dots.get_offsets()[0].tolist() in line.get_xydata().tolist()
+        assert dots.zorder > max(text.zorder for text in axes.texts)
 
 
 @pytest.mark.parametrize("rows", [pytest.param([], id="none"), pytest.param(ROWS[-1:], id="no-R")])
