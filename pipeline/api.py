@@ -23,11 +23,10 @@ from semidense.pipeline.plan.steps import Request
 from semidense.pipeline.plan.training_split import training_scenes
 from semidense.pipeline.results.metric_rows import METHOD
 from semidense.pipeline.results.result import Result
-from semidense.pipeline.variants import Swept, Thresholds, variants_of
+from semidense.pipeline.variants import Swept, Thresholds, variants_of, without_effect
 from semidense.stages.evaluation.filtering import SemidenseParams
 
 CACHE_VARIABLE = "PIPELINE_CACHE"
-_INSTEAD_OF_R = ("semidense.density", "semidense.max_error")
 Cache = Path | str | Store | None
 """Where results are kept: a folder, a URL, or an opened cache; None for the default of ``open_store``."""
 
@@ -167,12 +166,17 @@ def planned(task: Task, request: Request, forced: Texts = ()) -> Plan:
 
 
 def _plan(request: Request, store: Store, forced: Iterable[str]) -> Plan:
-    """Return the plan of what is to be made; refuse a product of training scenes where there are none."""
+    """Return the plan of what is to be made; refuse a product of training scenes where there are none.
+
+    A note names each setting that is swept and changes nothing.
+    """
     plan = make_plan(request, store, forced)
     for step in (planned.step for planned in plan.steps):
         if not all(step.inputs.values()):
             raise UsageError(f"{step.product} is made from training scenes, and there are none here: add --train")
-    return plan
+    idle = without_effect(request.configs, plan.targets)
+    told = (f"{name} changes nothing here: the {request.upto} are the same for each of its values" for name in idle)
+    return replace(plan, notes=(*plan.notes, *told))
 
 
 def run(
@@ -241,7 +245,7 @@ def _metric_rows(plan: Plan, store: Store, made: Mapping[str, Made]) -> Iterator
 
 def sweep(
     dataset: Data | Task = "motorcycle",
-    R: Thresholds = "0.05:0.95:0.05",
+    R: Thresholds = None,
     over: Swept = (),
     *,
     watch: Watch | None = None,
@@ -253,7 +257,8 @@ def sweep(
 
     Args:
         dataset: what to work on: a dataset, or a task that ``options`` refine.
-        R: confidence thresholds, or ``first:last:step`` with the last one included.
+        R: confidence thresholds, or ``first:last:step`` with the last one included; None takes 0.05:0.95:0.05 where R
+            decides, and none where ``semidense.density`` or ``semidense.max_error`` does.
         over: ``{"section.field": [value1, value2]}`` or ``section.field=value1,value2``; all combinations are made.
         watch: as for ``run``.
         scheduler: as for ``run``.
@@ -268,13 +273,16 @@ def sweep(
 
 
 def sweep_request(task: Task, R: Thresholds, over: Swept) -> Request:
-    """Return the request of a sweep; see ``sweep``."""
-    variants = variants_of(R, over)
-    swept = {setting.partition("=")[0] for variant in variants for setting in variant}
-    decided = not task.configuration().of("semidense", SemidenseParams).by_R or swept & set(_INSTEAD_OF_R)
-    if decided and len({threshold for threshold, *_ in variants}) > 1:
-        raise UsageError(f"{' and '.join(_INSTEAD_OF_R)} replace R, so several R give the same map; give one")
-    return task.request("metrics", variants)
+    """Return the request of a sweep; see ``sweep``.
+
+    Raises:
+        UsageError, DatasetError: if it cannot be carried out as it stands, or no scene has a ground truth.
+    """
+    by_R = task.configuration().of("semidense", SemidenseParams).by_R
+    request = task.request("metrics", variants_of(R, over, by_R))
+    if not any(scene.has_truth for scene in request.dataset.scenes):
+        raise UsageError(f"{request.dataset.spec}: no scene has a ground truth, and a sweep judges maps by it")
+    return request
 
 
 def explain(dataset: Data | Task, product: str, scene: str | None = None, **options: Unpack[Options]) -> Planned:

@@ -1,33 +1,87 @@
 """What a sweep tries: thresholds R, and values of settings, in all combinations."""
 
 import itertools
-from collections.abc import Iterable, Mapping
+import json
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from semidense.pipeline.plan.arguments import require_number, texts
-from semidense.pipeline.plan.config import alternatives, parse_setting, value_text
+from semidense.pipeline.plan.config import Config, alternatives, parse_setting, value_text
 from semidense.pipeline.plan.errors import UsageError, shortened
 
-Thresholds = str | float | Iterable[float]
-"""What R may be: a number, several, or a text of them."""
+THRESHOLDS = "0.05:0.95:0.05"
+"""The thresholds that are tried if none are named."""
+_INSTEAD_OF_R = ("semidense.density", "semidense.max_error")
+Thresholds = str | float | Iterable[float] | None
+"""What R may be: a number, several, a text of them, or None for ``THRESHOLDS``."""
 Swept = Mapping[str, object] | Iterable[str] | str | None
 """What is swept beside R: ``{"section.field": [value1, value2]}``, or ``section.field=value1,value2`` once or more."""
 
 
-def variants_of(R: Thresholds, over: Swept) -> list[tuple[str, ...]]:
+def variants_of(R: Thresholds, over: Swept, by_R: bool = True) -> list[tuple[str, ...]]:
     """Return the settings of each variant, as texts: a threshold, and a value of each setting that is swept.
 
+    Args:
+        R: the thresholds; None takes ``THRESHOLDS``.
+        over: the settings that are swept, each with its values.
+        by_R: whether R decides what is kept, as far as the settings say that are not swept. If not, or if one that
+            replaces R is swept, no variant has a threshold.
+
     Raises:
-        UsageError: if a threshold is none, R is swept in two ways, or a setting is given twice or has no value to try.
+        UsageError: if a threshold is none, R is swept in two ways or where it decides nothing, or a setting is given
+            twice or has no value to try.
 
     >>> variants_of("0.1,0.2", {"channels.rank_window": 15})
     [('semidense.R=0.1', 'channels.rank_window=15'), ('semidense.R=0.2', 'channels.rank_window=15')]
+    >>> variants_of(None, {"semidense.density": [0.6, 0.8]})
+    [('semidense.density=0.6',), ('semidense.density=0.8',)]
     """
-    thresholds, combined = [f"semidense.R={value!r}" for value in parse_thresholds(R)], _combined(over)
-    if any(setting.partition("=")[0] == "semidense.R" for values in combined for setting in values):
+    combined = _combined(over)
+    names = {setting.partition("=")[0] for values in combined for setting in values}
+    if "semidense.R" in names:
         raise UsageError("semidense.R is swept by R; give its values there")
-    return [(threshold, *combination) for combination in itertools.product(*combined) for threshold in thresholds]
+    if by_R and names.isdisjoint(_INSTEAD_OF_R):
+        thresholds = [(f"semidense.R={value!r}",) for value in parse_thresholds(THRESHOLDS if R is None else R)]
+    elif R is None:
+        thresholds = [()]
+    else:
+        raise UsageError(f"{' and '.join(_INSTEAD_OF_R)} replace R, which then decides nothing; leave R out")
+    return [(*threshold, *combination) for combination in itertools.product(*combined) for threshold in thresholds]
+
+
+def without_effect(configs: Mapping[str, Config], targets: Iterable[tuple[str, str]]) -> list[str]:
+    """Return the settings in which variants differ though they make the very same products.
+
+    Args:
+        configs: the configuration of each variant, by its name.
+        targets: ids of what was asked for, each with its variant, as a plan has them.
+    """
+    made: dict[str, list[str]] = {variant: [] for variant in configs}
+    for step_id, variant in targets:
+        made[variant].append(step_id)
+    settings = {variant: _flat(config) for variant, config in configs.items()}
+    names = dict.fromkeys(name for each in settings.values() for name in each)
+    return [name for name in names if _makes_no_difference(name, settings, made)]
+
+
+def _flat(config: Config) -> dict[str, str]:
+    """Return all settings of a configuration as JSON, by name."""
+    sections = config.to_dict().items()
+    return {f"{name}.{field}": json.dumps(value) for name, fields in sections for field, value in fields.items()}
+
+
+def _makes_no_difference(
+    name: str, settings: Mapping[str, Mapping[str, str]], made: Mapping[str, Sequence[str]]
+) -> bool:
+    """Return whether variants that differ in one setting alone make the same, and there are such variants."""
+    if len({each.get(name) for each in settings.values()}) == 1:
+        return False
+    alike: dict[frozenset[tuple[str, str]], list[str]] = {}
+    for variant, each in settings.items():
+        alike.setdefault(frozenset((key, value) for key, value in each.items() if key != name), []).append(variant)
+    groups = [[made[variant] for variant in group] for group in alike.values()]
+    return max(map(len, groups)) > 1 and all(each == group[0] for group in groups for each in group)
 
 
 def _combined(over: Swept) -> list[list[str]]:

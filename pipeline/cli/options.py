@@ -74,7 +74,12 @@ QuietOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object on stdout.")]
 OutputOption = Annotated[
-    Path | None, typer.Option("--output", "-o", help="Write maps, metrics and configuration to this folder, in place of those of an earlier run.")
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        help="Write maps, metrics and configuration to this folder, in place of those of an earlier run.",
+    ),
 ]
 SchedulerOption = Annotated[
     str | None,

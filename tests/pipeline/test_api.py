@@ -47,11 +47,32 @@ def test_what_a_sweep_cannot_sweep_is_refused() -> None:
         sweep_request(task, 0.5, {"training.dataset": [SPEC, f"{SPEC},seed=2"]})
     with pytest.raises(UsageError, match=r"semidense\.R is swept by R"):
         sweep_request(task, 0.5, {"semidense.R": [0.2, 0.3]})
-    with pytest.raises(UsageError, match="replace R, so several R give the same map"):
+    with pytest.raises(UsageError, match="replace R, which then decides nothing; leave R out"):
         sweep_request(task.and_settings(["semidense.density=0.5"]), "0.1,0.5", ())
-    with pytest.raises(UsageError, match="replace R, so several R give the same map"):
-        sweep_request(task, "0.1,0.5", {"semidense.density": [0.5, 0.6]})
-    assert len(sweep_request(task, 0.9, {"semidense.density": [0.5, 0.6]}).configs) == 2
+    with pytest.raises(UsageError, match="replace R, which then decides nothing; leave R out"):
+        sweep_request(task, 0.9, {"semidense.density": [0.5, 0.6]})
+
+
+def test_thresholds_are_tried_only_where_they_decide() -> None:
+    task = Task(SPEC, train=True)
+    densities = sweep_request(task, None, {"semidense.density": [0.5, 0.6]}).configs
+    assert [*densities] == ["semidense.density=0.5", "semidense.density=0.6"]
+    assert [*sweep_request(task.and_settings(["semidense.max_error=0.02"]), None, ()).configs] == [""]
+    assert len(sweep_request(task, None, ()).configs) == 19
+
+
+def test_a_sweep_without_a_ground_truth_is_refused(make_pair: MakePair, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="pair: no scene has a ground truth, and a sweep judges maps by it"):
+        sweep_request(Task(make_pair(tmp_path / "pair")), 0.5, ())
+
+
+def test_a_swept_setting_that_changes_nothing_is_noted(tmp_path: Path) -> None:
+    task = Task(TEST_ONLY, cache=tmp_path)
+    over = {"refined.tolerance": [1, 2], "disparity.subpixel": [True, False]}
+    notes = api.planned(task, sweep_request(task, "0.1,0.5", over)).notes
+    assert [note for note in notes if "changes nothing" in note] == [
+        "refined.tolerance changes nothing here: the metrics are the same for each of its values"
+    ]
 
 
 def test_a_setting_that_is_swept_twice_is_refused() -> None:

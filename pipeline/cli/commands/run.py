@@ -86,8 +86,13 @@ def run(
 def sweep(
     dataset: DatasetArgument = "motorcycle",
     thresholds: Annotated[
-        str, typer.Option("--R", help="Confidence thresholds: first:last:step, or numbers with commas.")
-    ] = "0.05:0.95:0.05",
+        str | None,
+        typer.Option(
+            "--R",
+            help="Confidence thresholds: first:last:step, or numbers with commas [default: 0.05:0.95:0.05; none where "
+            "semidense.density or semidense.max_error decides].",
+        ),
+    ] = None,
     scene: SceneOption = None,
     settings: Annotated[
         list[str] | None,
@@ -102,7 +107,10 @@ def sweep(
     config: ConfigOption = None,
     train: TrainOption = False,
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="Write sweep.csv, sweep.png and sweep.json to this folder.")
+        Path,
+        typer.Option(
+            "--output", "-o", help="Write sweep.csv and sweep.json to this folder; also sweep.png, where R decides."
+        ),
     ] = Path("sweep"),
     dry_run: DryRunOption = False,
     scheduler: SchedulerOption = None,
@@ -137,6 +145,8 @@ def sweep(
         console.print_json({"steps": steps, "metrics": result.metrics, "files": [str(file) for file in files]})
     else:
         console.print_sweep(result.metrics, result.mask_kinds())
+        by_R = any("R" in row for row in result.metrics)
+        console.print_notes([*result.plan.notes, *([] if by_R else ["no sweep.png: R does not decide here"])])
         _say_files(files)
         print(console.reuse_line(result.made.values()))
     return None

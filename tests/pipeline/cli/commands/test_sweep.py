@@ -1,5 +1,7 @@
 import csv
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -8,6 +10,9 @@ from semidense.pipeline.cli.console import print_sweep
 from semidense.pipeline.files.run_files import write_sweep
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.result import Result
+from tests.tiny import TRAINED
+
+Invoke = Callable[..., Any]
 
 
 @pytest.fixture
@@ -29,6 +34,15 @@ def test_a_dry_run_plans_every_value_and_makes_nothing(trained_task: Task, train
     plan = planned(trained_task, request)
     assert [each.step.R for each in plan.todo() if each.step.product == "semidense"] == [0.31, 0.32]
     assert planned(trained_task, request).todo() == plan.todo()
+
+
+def test_notes_are_printed_and_a_missing_picture_is_told(invoke: Invoke, trained_task: Task, tmp_path: Path) -> None:
+    shared = [*TRAINED, "--cache", trained_task.cache, "-o", tmp_path / "out"]
+    ran = invoke("sweep", *shared, "--set", "semidense.density=0.5", "--set", "refined.tolerance=1,2")
+    assert ran.code == 0, ran.err
+    assert "note: refined.tolerance changes nothing here" in ran.err
+    assert "note: no sweep.png: R does not decide here" in ran.err
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"sweep.csv", "sweep.json"}
 
 
 def test_without_a_pixel_kept_there_is_no_picture(rows: list[dict[str, object]], tmp_path: Path) -> None:
