@@ -72,7 +72,7 @@ def draw(found: Inspection, png: Path, pixel: str | None, disparity: int | None)
     from semidense.pipeline.files.writing import save_png
 
     step = found.planned.step
-    place = _parse_pixel(pixel, found.dataset) if pixel else None
+    place = None if pixel is None else _parse_pixel(pixel, found.dataset)
     title, truth = product_title(found.dataset), found.truth
     save_png(figure(step.product, found.dataset, title=title, pixel=place, disparity=disparity, truth=truth), png)
 

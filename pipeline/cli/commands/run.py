@@ -215,9 +215,9 @@ def inspect(
     dataset: DatasetArgument = "motorcycle",
     scene: SceneOption = None,
     png: Annotated[Path | None, typer.Option("--png", help="Draw the product into this file.")] = None,
-    pixel: Annotated[str | None, typer.Option("--pixel", help="Draw the cost curve of this pixel: Y,X.")] = None,
+    pixel: Annotated[str | None, typer.Option("--pixel", help="With --png: draw the cost curve of this pixel: Y,X.")] = None,
     disparity: Annotated[
-        int | None, typer.Option("--disparity", help="Draw the slice of costs at this disparity, px.")
+        int | None, typer.Option("--disparity", help="With --png: draw the slice of costs at this disparity, px.")
     ] = None,
     settings: SetOption = None,
     preset: PresetOption = None,
@@ -233,7 +233,10 @@ def inspect(
     """
     from semidense.pipeline import api
     from semidense.pipeline.cli.commands.inspect import draw, inspection, print_inspection
+    from semidense.pipeline.plan.errors import UsageError
 
+    if png is None and (pixel is not None or disparity is not None):
+        raise UsageError("--pixel and --disparity choose what is drawn into --png: add --png FILE")
     task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     planned = api.explain(task, product)
     found = inspection(planned, api.open_store(cache), task)

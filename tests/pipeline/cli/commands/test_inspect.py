@@ -1,4 +1,6 @@
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,6 +51,7 @@ def test_what_is_derived_is_not_listed(costs: Inspection) -> None:
 @pytest.mark.parametrize(
     ("pixel", "disparity", "message"),
     [
+        pytest.param("", None, "pixel '': write Y,X", id="nothing"),
         pytest.param("12", None, "pixel '12': write Y,X such as 120,200", id="one number"),
         pytest.param("a,b", None, "write Y,X", id="no numbers"),
         pytest.param("64,0", None, "outside the image of 64 x 80 px", id="below the image"),
@@ -64,6 +67,15 @@ def test_what_is_not_in_the_product_is_refused(
         draw(costs, tmp_path / "p.png", pixel, disparity)
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("option", [("--pixel", "nonsense"), ("--disparity", "0")], ids=lambda option: option[0])
+def test_what_only_a_picture_shows_is_refused_without_one(
+    invoke: Callable[..., Any], tmp_path: Path, option: tuple[str, str]
+) -> None:
+    ran = invoke("inspect", "costvolume", *option, "--cache", tmp_path)
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err == "pipeline: --pixel and --disparity choose what is drawn into --png: add --png FILE\n"
 
 
 def test_a_picture_that_cannot_be_written_is_refused(costs: Inspection, tmp_path: Path) -> None:
