@@ -90,7 +90,8 @@ SchedulerOption = Annotated[
     ),
 ]
 WorkersOption = Annotated[
-    int | None, typer.Option("--workers", min=1, help="Number of threads [default: one for each core].")
+    int | None,
+    typer.Option("--workers", min=1, help="Number of threads [default: one for each core]; not with --scheduler."),
 ]
 UptoOption = Annotated[str, typer.Option("--upto", help="Make products up to this one.")]
 ForceOption = Annotated[

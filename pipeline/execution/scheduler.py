@@ -15,6 +15,7 @@ from semidense.pipeline.execution.cluster.running import SETTLE_SECONDS, run_on_
 from semidense.pipeline.execution.graph import make_graph, there
 from semidense.pipeline.execution.jobs import Context, flat
 from semidense.pipeline.execution.watch import Unwatched, Watch
+from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import Made, Plan
 
 
@@ -39,9 +40,11 @@ def execute(
         lease: that the plan's hits were added to; None if nobody cleans the cache meanwhile.
 
     Raises:
+        UsageError: if both a scheduler and workers are given.
         StageRefused: if a stage refuses what it was given.
         StageFailed: if a stage fails; what was made before is kept, nothing half-made is left.
     """
+    _require_one(scheduler, workers)
     store.sweep_drafts()
     if not plan.todo():
         return {planned.step.id: there(planned) for planned in plan.steps}
@@ -63,9 +66,18 @@ def threads_of(scheduler: str | None, workers: int | None) -> int:
     """Return how many tasks a run carries out at a time, given what ``execute`` is given.
 
     Raises:
-        UsageError: if no scheduler answers.
+        UsageError: if no scheduler answers, or both are given.
     """
+    _require_one(scheduler, workers)
     return count_threads(scheduler) if scheduler else workers or os.cpu_count() or 1
+
+
+def _require_one(scheduler: str | None, workers: int | None) -> None:
+    if scheduler and workers is not None:
+        raise UsageError(
+            f"--workers {workers} counts threads of this process, and --scheduler {scheduler} works with other ones: "
+            f"leave one out; processes:{workers} starts {workers} processes"
+        )
 
 
 def _on_threads(plan: Plan, context: Context, threads: int) -> list[Made]:

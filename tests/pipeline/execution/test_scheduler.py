@@ -12,9 +12,9 @@ import pytest
 
 from semidense.cache import NonDeterministicStage, Store
 from semidense.cache.entries import publish
-from semidense.pipeline.execution.scheduler import execute, totals
+from semidense.pipeline.execution.scheduler import execute, threads_of, totals
 from semidense.pipeline.execution.watch import Unwatched
-from semidense.pipeline.plan.errors import StageFailed, StageRefused
+from semidense.pipeline.plan.errors import StageFailed, StageRefused, UsageError
 from semidense.pipeline.plan.plan import Made, Plan
 from semidense.pipeline.plan.steps import Graph
 from semidense.stages.stage import Stage
@@ -74,6 +74,15 @@ def test_tiles_with_a_border_of_their_own_are_the_whole(toy_run: ToyRun, store: 
     padded = np.pad(toy.make_ramp(0, {})["values"], 2, mode="edge")
     expected = np.lib.stride_tricks.sliding_window_view(padded, (5, 5)).sum(axis=(2, 3))
     assert np.array_equal(values(store, made["blurred"]), expected)
+
+
+def test_threads_and_a_scheduler_exclude_each_other(toy_plan: ToyPlan, store: Store) -> None:
+    message = r"--workers 3 counts threads.*--scheduler processes:1 works with other ones: leave one out; processes:3 "
+    with pytest.raises(UsageError, match=message):
+        execute(toy_plan(chain()), store, Unwatched(), {}, "processes:1", 3)
+    with pytest.raises(UsageError, match=message):
+        threads_of("processes:1", 3)
+    assert CALLS == []
 
 
 def test_the_number_of_workers_changes_nothing(toy_plan: ToyPlan, tmp_path: Path) -> None:
