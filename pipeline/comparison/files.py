@@ -9,8 +9,8 @@ from semidense.datasets.formats.atomic import atomic_write
 from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.figures import density_figure, dots_figure, sheets
 from semidense.pipeline.comparison.tables import TITLES, at, of, quoted
-from semidense.pipeline.files.publishing import publishing, refuse_foreign
-from semidense.pipeline.files.writing import explaining, require_writable, save_png, table_text
+from semidense.pipeline.files.publishing import publishing, require_place
+from semidense.pipeline.files.writing import explaining, save_png, table_text
 from semidense.pipeline.results.metric_rows import FIGURES, THRESHOLD
 
 COLUMNS = ("experiment", "scene", "method", "mask", "threshold_px", "R", *FIGURES, "quoted", "data")
@@ -38,14 +38,9 @@ def as_json(found: Comparison, files: Iterable[Path] = ()) -> dict[str, Any]:
     }
 
 
-def require_place(folder: Path, experiments: Iterable[str]) -> None:
-    """Refuse a folder that cannot be written, without making it: comparing takes long.
-
-    Raises:
-        UsageError: as ``write_comparison``.
-    """
-    require_writable(folder)
-    refuse_foreign(folder, _RECORD, {*_TABLES, *(f"{experiment}.png" for experiment in experiments)})
+def require_comparison_place(folder: Path, experiments: Iterable[str]) -> None:
+    """Refuse a folder for a comparison before it is made; see ``publishing.require_place``."""
+    require_place(folder, _RECORD, {*_TABLES, *(f"{experiment}.png" for experiment in experiments)})
 
 
 def write_comparison(found: Comparison, folder: Path, threshold: float = THRESHOLD) -> list[Path]:

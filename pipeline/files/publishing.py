@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from semidense.datasets.formats.atomic import atomic_write
-from semidense.pipeline.files.writing import explaining, writable_folder
+from semidense.pipeline.files.writing import explaining, require_writable, writable_folder
 from semidense.pipeline.plan.errors import UsageError
 
 
@@ -81,6 +81,17 @@ def refuse_foreign(folder: Path, record: str, names: Iterable[str], inputs: Iter
                 f"{path}: this file was not written by an earlier command of this kind ({record} does not name it); "
                 "move it, or name another folder with -o"
             )
+
+
+def require_place(folder: Path, record: str, names: Iterable[str]) -> None:
+    """Refuse a folder before anything is made that will be written there: that takes long. It is not made.
+
+    Raises:
+        UsageError: if it, or the nearest folder above it that there is, is a file or closed to this user; or with the
+            first file of somebody else that would be replaced.
+    """
+    require_writable(folder)
+    refuse_foreign(folder, record, names)
 
 
 def written_before(folder: Path, record: str) -> set[str]:

@@ -31,7 +31,7 @@ from semidense.datasets.formats.pfm import write_pfm
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.figures.colours import confidence_rgb, disparity_rgb, disparity_span
 from semidense.pipeline.files.file_names import safe_names
-from semidense.pipeline.files.publishing import publishing, written_before
+from semidense.pipeline.files.publishing import publishing, require_place, written_before
 from semidense.pipeline.files.selection import Wanted, wanted
 from semidense.pipeline.files.writing import explaining, save_png, table_text, write_rgb
 from semidense.pipeline.plan.plan import Made
@@ -45,12 +45,24 @@ COLUMNS = ("scene", "method", "mask", "threshold_px", "R", "pixels", *ROW)
 """The columns of ``metrics.csv``: the keys of the rows that are promised to scripts."""
 CONFIG = "config.json"
 """The record of an export."""
+_SWEEP = "sweep.json"
+"""The record of a sweep."""
 _MAPS = ("disparity", "confidence", "semidense")
 _EXPORTED = re.compile(r"metrics\.csv|[^/.][^/]*(\.safetensors|/(disparity|confidence)[^/]*(\.pfm|-colour\.png))")
 """Names of files that an export writes beside its record: no record makes it delete others."""
 _LAST = 50
 """Training steps that the final loss is a mean of."""
 _Span = tuple[float, float]
+
+
+def require_run_place(folder: Path, upto: str) -> None:
+    """Refuse a folder for the results of a run up to a product before it is made; see ``publishing.require_place``."""
+    require_place(folder, CONFIG, {CONFIG, *(["metrics.csv"] if upto == "metrics" else [])})
+
+
+def require_sweep_place(folder: Path) -> None:
+    """Refuse a folder for a sweep before it is made; see ``publishing.require_place``."""
+    require_place(folder, _SWEEP, {"sweep.csv", "sweep.png", _SWEEP})
 
 
 def export(result: Result, folder: Path) -> list[Path]:
@@ -217,13 +229,13 @@ def write_sweep(rows: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
     """
     from semidense.pipeline.figures.curves import error_curve_figure  # Matplotlib takes a second to load
 
-    with publishing(folder, "sweep.json", obsolete={"sweep.png"}) as draft:
+    with publishing(folder, _SWEEP, obsolete={"sweep.png"}) as draft:
         write_rows(rows, draft / "sweep.csv")
         names = ["sweep.csv"]
         if any("bad" in row and "R" in row for row in rows):
             save_png(error_curve_figure(rows, threshold=THRESHOLD), draft / "sweep.png")
             names.append("sweep.png")
-        names.append("sweep.json")
+        names.append(_SWEEP)
         document = provenance(sys.argv) | {"files": names}
-        (draft / "sweep.json").write_text(json.dumps(document, indent=2) + "\n")
+        (draft / _SWEEP).write_text(json.dumps(document, indent=2) + "\n")
     return [folder / name for name in names]

@@ -111,7 +111,7 @@ def compare(
     store = api.open_store(cache)
     if dry_run:
         return console.show_plan(prepared.plan(), store, as_json)
-    comparison_report.require_place(output, prepared.experiments)
+    comparison_report.require_comparison_place(output, prepared.experiments)
     with ProgressWatch(console.announce, verbose - quiet) as watch:
         watch.expect(prepared.plan(), store)
         found = carry_out_comparison(prepared, watch=watch, scheduler=scheduler, workers=workers)

@@ -64,14 +64,14 @@ def run(
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
     from semidense.pipeline.execution.scheduler import threads_of
-    from semidense.pipeline.files.writing import require_writable
+    from semidense.pipeline.files.run_files import require_run_place
 
     task = _task(dataset, scene, chosen(settings, mode), config, train, cache, preset)
     if dry_run:
         plan = api.status(task, upto, forced=force or ())
         return console.show_plan(plan, api.open_store(cache), as_json, threads_of(scheduler, workers))
     if output:
-        require_writable(output)
+        require_run_place(output, upto)
     with ProgressWatch(console.announce, verbose - quiet) as watch:
         result = api.run(task, upto, forced=force or (), watch=watch, scheduler=scheduler, workers=workers)
     files = _export(result, output)
@@ -128,15 +128,14 @@ def sweep(
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
     from semidense.pipeline.execution.scheduler import threads_of
-    from semidense.pipeline.files.run_files import write_sweep
-    from semidense.pipeline.files.writing import require_writable
+    from semidense.pipeline.files.run_files import require_sweep_place, write_sweep
 
     task = _task(dataset, scene, chosen(None, mode), config, train, cache, preset)
     if dry_run:
         request = api.sweep_request(task, thresholds, settings or ())
         plan = api.planned(task, request)
         return console.show_plan(plan, api.open_store(cache), as_json, threads_of(scheduler, workers))
-    require_writable(output)
+    require_sweep_place(output)
     with ProgressWatch(console.announce, verbose - quiet) as watch:
         result = api.sweep(task, thresholds, settings or (), watch=watch, scheduler=scheduler, workers=workers)
     files = write_sweep(result.metrics, output)
@@ -215,7 +214,9 @@ def inspect(
     dataset: DatasetArgument = "motorcycle",
     scene: SceneOption = None,
     png: Annotated[Path | None, typer.Option("--png", help="Draw the product into this file.")] = None,
-    pixel: Annotated[str | None, typer.Option("--pixel", help="With --png: draw the cost curve of this pixel: Y,X.")] = None,
+    pixel: Annotated[
+        str | None, typer.Option("--pixel", help="With --png: draw the cost curve of this pixel: Y,X.")
+    ] = None,
     disparity: Annotated[
         int | None, typer.Option("--disparity", help="With --png: draw the slice of costs at this disparity, px.")
     ] = None,

@@ -64,16 +64,21 @@ def submit(
     from semidense.pipeline import api
     from semidense.pipeline.cli import console
     from semidense.pipeline.execution.progress import ProgressWatch
-    from semidense.pipeline.files.submissions.archive import forms_of, layout_of, require_complete, write_archive
-    from semidense.pipeline.files.writing import require_writable
+    from semidense.pipeline.files.submissions.archive import (
+        forms_of,
+        layout_of,
+        require_complete,
+        require_place,
+        write_archive,
+    )
 
     layout = layout_of(benchmark)
     forms = forms_of(layout, form)
+    require_place(method, output)
     named = chosen_preset(preset, config)
     task = api.Task(dataset, tuple(scene or ()), chosen(settings, mode), config_file(config), False, cache, named)
     scenes = task.open().scenes
     lacks = require_complete(layout, scenes, partial)
-    require_writable(output.parent)
     with ProgressWatch(console.announce) as watch:
         result = api.run(task, _PRODUCTS[forms[0]] if len(forms) == 1 else "filled", watch=watch, workers=workers)
     written = write_archive(layout, (_solved(result, each, forms) for each in scenes), method, output)

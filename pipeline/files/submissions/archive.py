@@ -11,7 +11,7 @@ from semidense.pipeline.files.submissions.eth3d import ETH3D
 from semidense.pipeline.files.submissions.kitti2015 import KITTI2015
 from semidense.pipeline.files.submissions.middlebury import MIDDLEBURY
 from semidense.pipeline.files.submissions.solved import METHOD, Form, Layout, Solved
-from semidense.pipeline.files.writing import explaining
+from semidense.pipeline.files.writing import explaining, require_writable, writable_folder
 from semidense.pipeline.plan.errors import UsageError, nearest
 
 LAYOUTS = {layout.name: layout for layout in (MIDDLEBURY, KITTI2015, ETH3D)}
@@ -66,14 +66,27 @@ def require_complete(layout: Layout, scenes: Sequence[SceneSource], partial: boo
     return lacks
 
 
+def require_place(method: str, path: Path) -> None:
+    """Refuse a method's name or a place for the archive before the maps are made, which takes long.
+
+    Raises:
+        UsageError: if the name breaks the rules, or the place is a folder or cannot be written.
+    """
+    if not METHOD.fullmatch(method):
+        raise UsageError(f"method {method!r}: up to 20 letters, digits, + and - stand in the names of files")
+    if path.is_dir():
+        raise UsageError(f"{path}: this is a folder; name the archive, such as {path / 'submission.zip'}")
+    require_writable(path.parent)
+
+
 def write_archive(layout: Layout, solved: Iterable[Solved], method: str, path: Path) -> Written:
     """Write the archive and check all that is in it; an existing one is replaced only by one that passes.
 
     Raises:
         UsageError: if the method's name or a map breaks the rules, or the archive cannot be written; none is then left.
     """
-    if not METHOD.fullmatch(method):
-        raise UsageError(f"method {method!r}: up to 20 letters, digits, + and - stand in the names of files")
+    require_place(method, path)
+    writable_folder(path.parent)
     with explaining(path), TemporaryDirectory(prefix=".submission-", dir=path.parent) as folder:
         draft, seconds = Path(folder, path.name), []
         owners: dict[str, SceneSource] = {}

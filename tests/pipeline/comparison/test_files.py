@@ -104,6 +104,6 @@ def test_a_folder_is_used_again_by_other_experiments(tmp_path: Path, monkeypatch
 
 def test_a_picture_of_somebody_else_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
     (tmp_path / "raw.png").write_text("mine")
-    files.require_place(tmp_path, ["auc"])
+    files.require_comparison_place(tmp_path, ["auc"])
     with pytest.raises(UsageError, match=r"raw\.png: this file was not written by an earlier command"):
-        files.require_place(tmp_path, ["raw"])
+        files.require_comparison_place(tmp_path, ["raw"])

@@ -14,7 +14,7 @@ from safetensors import safe_open
 from semidense.cache import Store
 from semidense.datasets.formats.pfm import read_pfm
 from semidense.pipeline.figures.colours import confidence_rgb, disparity_rgb
-from semidense.pipeline.files.run_files import COLUMNS, export, write_rows
+from semidense.pipeline.files.run_files import COLUMNS, export, require_run_place, require_sweep_place, write_rows
 from semidense.pipeline.files.writing import writable_folder
 from semidense.pipeline.plan import shipped_weights as shipped
 from semidense.pipeline.plan.errors import UsageError
@@ -292,6 +292,18 @@ def test_a_variant_is_a_column_only_if_it_is_needed(
 ) -> None:
     write_rows(rows, tmp_path / "a.csv")
     assert (tmp_path / "a.csv").read_text().splitlines()[0].split(",") == list(columns)
+
+
+def test_a_table_of_somebody_else_is_refused_beforehand(tmp_path: Path) -> None:
+    for name in ("metrics.csv", "sweep.csv"):
+        (tmp_path / name).write_text("mine")
+    with pytest.raises(UsageError, match=r"metrics\.csv: this file was not written by"):
+        require_run_place(tmp_path, "metrics")
+    require_run_place(tmp_path, "disparity")
+    with pytest.raises(UsageError, match=r"sweep\.csv: this file was not written by"):
+        require_sweep_place(tmp_path)
+    with pytest.raises(UsageError, match=r"metrics\.csv is a file"):
+        require_sweep_place(tmp_path / "metrics.csv" / "out")
 
 
 @pytest.mark.parametrize("place", [pytest.param("file", id="a-file"), pytest.param("file/out", id="below-a-file")])

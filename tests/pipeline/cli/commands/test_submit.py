@@ -35,8 +35,25 @@ def test_an_incomplete_set_is_refused_before_anything_is_computed(invoke: Invoke
     assert not (evaluation / "a.zip").exists()
 
 
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        pytest.param(("--method", "a b/c"), "method 'a b/c': up to 20 letters", id="a name with a slash"),
+        pytest.param(("-o", "."), ".: this is a folder; name the archive, such as submission.zip", id="a folder"),
+    ],
+)
+def test_a_name_or_a_place_that_will_not_do_is_refused_before_anything_is_computed(
+    invoke: Invoke, evaluation: Path, option: tuple[str, str], message: str
+) -> None:
+    cache = evaluation / "cache"
+    ran = invoke("submit", "middlebury", f"middlebury:{evaluation}", "--partial", *option, "--cache", cache)
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert message in ran.err
+    assert not cache.exists()
+
+
 def test_a_partial_archive_holds_maps_and_times(invoke: Invoke, evaluation: Path) -> None:
-    archive = evaluation / "a.zip"
+    archive = evaluation / "new" / "a.zip"
     ran = invoke(
         *("submit", "middlebury", f"middlebury:{evaluation}", "-o", archive, "--partial", "--method", "Mine"),
         *("--mode", "fast", "--cache", evaluation / "cache", "--json"),
