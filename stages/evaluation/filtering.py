@@ -5,7 +5,7 @@ from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from semidense.stages.evaluation.calibration.declaration import Calibrated
 from semidense.stages.evaluation.declaration import Confidence
@@ -45,6 +45,12 @@ class SemidenseParams(Params):
         if self.density is not None and self.max_error is not None:
             raise ValueError("density and max_error both say how much to keep; give one of them")
         return self
+
+    @model_serializer(mode="wrap")
+    def _that_matter(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out R where it is replaced: it is in no key then."""
+        fields: dict[str, Any] = dump(self)
+        return {name: value for name, value in fields.items() if self.by_R or name != "R"}
 
 
 def keep_confident(disparity: NDArray[Any], confidence: NDArray[Any], R: float) -> NDArray[np.float32]:
