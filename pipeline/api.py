@@ -273,11 +273,7 @@ def sweep(
 
 
 def sweep_request(task: Task, R: Thresholds, over: Swept) -> Request:
-    """Return the request of a sweep; see ``sweep``.
-
-    Raises:
-        UsageError, DatasetError: if it cannot be carried out as it stands, or no scene has a ground truth.
-    """
+    """Return the request of a sweep, as ``sweep`` takes it; refused where no scene has a ground truth: UsageError."""
     by_R = task.configuration().of("semidense", SemidenseParams).by_R
     request = task.request("metrics", variants_of(R, over, by_R))
     if not any(scene.has_truth for scene in request.dataset.scenes):

@@ -42,7 +42,8 @@ def variants_of(R: Thresholds, over: Swept, by_R: bool = True) -> list[tuple[str
     if "semidense.R" in names:
         raise UsageError("semidense.R is swept by R; give its values there")
     if by_R and names.isdisjoint(_INSTEAD_OF_R):
-        thresholds = [(f"semidense.R={value!r}",) for value in parse_thresholds(THRESHOLDS if R is None else R)]
+        tried = parse_thresholds(THRESHOLDS if R is None else R)
+        thresholds: list[tuple[str, ...]] = [(f"semidense.R={value!r}",) for value in tried]
     elif R is None:
         thresholds = [()]
     else:

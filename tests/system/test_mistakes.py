@@ -169,6 +169,7 @@ def test_a_fault_of_the_program_is_a_traceback_and_exit_code_1(tmp_path: Path, p
         [sys.executable, "-c", code], cwd=project, capture_output=True, text=True, timeout=60, check=False
     )
     assert (ran.returncode, ran.stdout) == (1, "")
-    assert ran.stderr.splitlines()[-1] == "semidense.pipeline.plan.errors.StageFailed: images of test-0: RuntimeError: bang"
+    line = "semidense.pipeline.plan.errors.StageFailed: images of test-0: RuntimeError: bang"
+    assert ran.stderr.splitlines()[-1] == line
     assert "RuntimeError: bang" in ran.stderr, "the cause is told"
     assert list((tmp_path / "cache" / "drafts").iterdir()) == []

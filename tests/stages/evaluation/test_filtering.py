@@ -150,7 +150,7 @@ def test_the_section_refuses_a_density(density: float) -> None:
 
 
 @pytest.mark.parametrize("wish", [{"density": 0.5}, {"max_error": 0.02}])
-def test_a_replaced_R_is_in_no_key(wish: dict[str, float]) -> None:
+def test_a_threshold_that_is_replaced_is_in_no_key(wish: dict[str, float]) -> None:
     one, other = (SemidenseParams(R=R, **wish).model_dump(mode="json") for R in (0.2, 0.9))
     assert one == other and "R" not in one
     assert SemidenseParams(R=0.2).model_dump()["R"] == 0.2
