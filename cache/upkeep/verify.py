@@ -50,6 +50,11 @@ class Sizes:
     orphans: int
     total: int
 
+    @property
+    def bookkeeping(self) -> int:
+        """Bytes of all else: records of the entries, sources of the stages, locks."""
+        return max(0, self.total - sum(self.stages.values()) - self.quarantine - self.drafts - self.orphans)
+
 
 def verify(store: Store, keys: Iterable[str] | None = None, progress: Progress | None = None) -> Report:
     """Read every byte of every entry again, whatever the store's policy, and list what is in quarantine.

@@ -15,7 +15,7 @@ from semidense.pipeline.plan.causes import PENDING
 from semidense.pipeline.plan.plan import Made, Plan, Planned
 from semidense.pipeline.results.estimate import Estimate, Part, estimate, estimate_parts, in_all
 from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, averaged, with_means
-from semidense.pipeline.results.text import print_table, results
+from semidense.pipeline.results.text import counted, print_table, results
 from semidense.stages.metrics.stage import ROW
 
 _COLUMNS = (*ROW, "pixels")
@@ -79,7 +79,7 @@ def part_row(part: Part, workers: int) -> dict[str, Any]:
 
 def _print_parts(parts: Sequence[Part], workers: int, console: Console) -> None:
     """Print a line a product: how many tasks and bytes, and how long they take."""
-    heads = ("tasks", "MB", f"min on {workers} worker{'s' if workers > 1 else ''}")
+    heads = ("tasks", "MB", f"min on {counted(workers, 'worker')}")
     table = Table("product", *heads, box=None, pad_edge=False)
     for column in table.columns[1:]:
         column.justify = "right"
@@ -102,9 +102,9 @@ def print_plan(plan: Plan, time: Estimate, parts: Sequence[Part] = (), workers: 
         todo[planned.step.product] = todo.get(planned.step.product, 0) + 1
     hits = len(plan.steps) - len(plan.todo())
     making = ", ".join(f"{count} {product}" for product, count in todo.items()) or "nothing"
-    console.print(f"reuses {hits} products, makes {making}", highlight=False)
+    console.print(f"reuses {counted(hits, 'product')}, makes {making}", highlight=False)
     if todo:
-        where = f" on {workers} worker{'s' if workers > 1 else ''}" if parts and time.seconds is not None else ""
+        where = f" on {counted(workers, 'worker')}" if parts and time.seconds is not None else ""
         console.print(f"time: {time}{where}", highlight=False)
 
 
@@ -175,7 +175,7 @@ def reuse_line(made: Iterable[Made]) -> str:
     counts = totals(made)
     reused = sum(old for old, _ in counts.values())
     fresh = ", ".join(f"{new} {product}" for product, (_, new) in counts.items() if new)
-    return f"reused {reused} products, made {fresh or 'nothing'}"
+    return f"reused {counted(reused, 'product')}, made {fresh or 'nothing'}"
 
 
 def print_metrics(rows: Sequence[Mapping[str, Any]], masks: Mapping[str, str]) -> None:

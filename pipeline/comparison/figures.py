@@ -14,7 +14,7 @@ from semidense.pipeline.comparison.methods import MATCHERS
 from semidense.pipeline.figures.colours import BLUE, QUIET, RED, disparity_rgb, disparity_span
 from semidense.pipeline.figures.curves import draw_matchers
 from semidense.pipeline.figures.drawing import new_figure
-from semidense.pipeline.results.metric_rows import FIGURES, METHOD, Row, mean_name, mean_rows
+from semidense.pipeline.results.metric_rows import FIGURES, METHOD, Row, mean_name, mean_rows, over_scenes
 from semidense.stages.stage import Array, Arrays
 from semidense.stages.transforms.gray import to_gray
 
@@ -52,7 +52,7 @@ def dots_figure(rows: Sequence[Row], figure: str, *, title: str, width: float = 
         axes.plot(values, [method] * len(values), "o", color=BLUE, markersize=4, label="a scene")
     optimal = next((row["auc_optimal"] for row in means.values() if "auc_optimal" in row), None)
     if optimal is not None:
-        axes.axvline(optimal, color=RED, linestyle="--", label="area of a perfect order")
+        axes.axvline(optimal, color=RED, linestyle="--", label=f"{'mean ' * (len(scenes) > 1)}area of a perfect order")
     axes.invert_yaxis()
     shown, judged = FIGURES[figure], rows[0]
     unit = "" if shown.unit == "1" else f" ({shown.unit})"
@@ -102,7 +102,7 @@ def density_figure(means: Sequence[Row]) -> Figure:
     mask, threshold, scenes = judged["mask"], judged["threshold_px"], judged["scene"]
     others = [row for row in means if row["experiment"] == "density" and "bad" in row and "R" not in row]
     draw_matchers(axes, [row for row in others if row["scene"] == scenes])
-    axes.set_xlabel(f"invalid: {mask} pixels without a disparity (%), {scenes} scenes")
+    axes.set_xlabel(f"invalid: {mask} pixels without a disparity (%), {over_scenes(judged)}")
     axes.set_ylabel(f"bad: reported {mask} pixels off by more than {threshold:g} px (%)")
     axes.margins(x=0.12)
     axes.set_ylim(bottom=0)
@@ -121,8 +121,13 @@ _WIDTH = 2.6
 
 
 def sheets(found: Comparison) -> dict[str, Figure]:
-    """Return two sheets by file name: the scenes whose views are lit most differently, and those of least texture."""
+    """Return two sheets by file name: the scenes whose views are lit most differently, and those of least texture.
+
+    A lone scene has only ``texture.png``: the other would be the same.
+    """
     images = {scene: found.images(scene) for scene in found.scenes}
+    if len(images) == 1:
+        return {"texture.png": _sheet(found, list(images), "Maps")}
     return {
         "lighting.png": _sheet(found, _hardest(images, "lighting"), "Views lit most differently"),
         "texture.png": _sheet(found, _hardest(images, "texture"), "Least texture"),

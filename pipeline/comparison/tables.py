@@ -9,7 +9,7 @@ from rich.table import Table
 from semidense.pipeline.comparison.experiments import Comparison
 from semidense.pipeline.comparison.paper_figures import QUOTED
 from semidense.pipeline.comparison.rows import Row
-from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, mean_name
+from semidense.pipeline.results.metric_rows import FIGURES, MASK, THRESHOLD, over_scenes
 from semidense.pipeline.results.text import print_table, results
 
 TITLES = {
@@ -93,8 +93,7 @@ def _by_scene(rows: Sequence[Row], means: Sequence[Row], experiment: str, figure
 
 def _density_table(means: Sequence[Row]) -> Table:
     """Return a table of semi-dense maps: mean figures over the scenes."""
-    plural = "" if means[0]["scene"] == mean_name(1) else "s"
-    title = f"Semi-dense maps, {means[0]['scene']} scene{plural}"
+    title = f"Semi-dense maps, {over_scenes(means[0])}"
     table = _table(title, "method", "R", *(FIGURES[name].head for name in _DENSITY))
     for row in means:
         threshold = f"{row['R']:g}" if "R" in row else "-"

@@ -3,6 +3,7 @@
 A volume may be far larger than memory: one disparity, one pixel and a few rows of it are read, never the whole.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -107,7 +108,7 @@ def draw_curve(axes: Axes, disparities: NDArray[np.int_], costs: NDArray[np.floa
     axes.plot(disparities, costs, color=BLUE, marker=".", linewidth=1.2, label="cost")
     marks = zip(local_minima(costs)[:2], ("winner", "runner-up minimum"), ("*", "v"), (RED, ORANGE), strict=False)
     for index, name, marker, colour in marks:
-        label = f"{name}: {disparities[index]} px, cost {costs[index]:.2f}, probability {expit(costs[index]):.2g}"
+        label = f"{name}: {disparities[index]} px, cost {costs[index]:.2f}, probability {_probability(costs[index])}"
         style: dict[str, Any] = {"markersize": 13, "markeredgecolor": "black", "linestyle": "none"}
         axes.plot(disparities[index], costs[index], marker=marker, color=colour, label=label, **style)
     _shade_invalid(axes, disparities, costs)
@@ -153,6 +154,18 @@ def expit(log_odds: float) -> float:
     0.5
     """
     return float(0.5 * (1 + np.tanh(np.float64(log_odds) / 2)))
+
+
+def _probability(log_odds: float) -> str:
+    """Return the probability of log-odds to two digits, near 1 to two digits of what it lacks.
+
+    >>> _probability(-5.4), _probability(5.4), _probability(20.0)
+    ('0.0045', '0.9955', '1 - 2.1e-09')
+    """
+    lacks = expit(-log_odds)
+    if lacks >= 0.5 or not lacks:
+        return f"{expit(log_odds):.2g}"
+    return f"{1 - lacks:.{1 - math.floor(math.log10(lacks))}f}" if lacks > 1e-6 else f"1 - {lacks:.2g}"
 
 
 def _probability_axis(axes: Axes) -> None:

@@ -62,6 +62,11 @@ def mean_name(scenes: int) -> str:
     return f"mean of {scenes}"
 
 
+def over_scenes(mean: Row) -> str:
+    """Return what a mean row is a mean of, for people: ``mean of 8 scenes``."""
+    return f"{mean['scene']} scene{'' if mean['scene'] == mean_name(1) else 's'}"
+
+
 def mean_rows(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Return the mean over the scenes, for rows that agree in everything else; its ``scene`` is ``mean of N``.
 

@@ -15,6 +15,15 @@ _TEXT = 20
 """Characters that a line of a folded text has at least."""
 
 
+def counted(number: int, one: str, several: str = "") -> str:
+    """Return a number of things: ``several`` is their word if that is not ``one`` with an s.
+
+    >>> counted(1, "scene"), counted(2_000, "scene"), counted(0, "entry", "entries")
+    ('1 scene', '2,000 scenes', '0 entries')
+    """
+    return f"{number:,} {one if number == 1 else several or f'{one}s'}"
+
+
 def bytes_text(count: int) -> str:
     """Return a number of bytes for people: ``47.7 MB``."""
     value = float(count)

@@ -199,7 +199,7 @@ def test_without_the_ablation_no_matching_net_is_trained(found: Comparison, task
 
 def test_files_hold_all_rows_and_what_is_quoted(found: Comparison, tmp_path: Path) -> None:
     files = write_comparison(found, tmp_path / "new")
-    names = {"comparison.csv", "comparison.json", "raw.png", "auc.png", "density.png", "lighting.png", "texture.png"}
+    names = {"comparison.csv", "comparison.json", "raw.png", "auc.png", "density.png", "texture.png"}
     assert {file.name for file in files} == names
     written = list(csv.DictReader(files[0].read_text().splitlines()))
     assert tuple(written[0]) == COLUMNS

@@ -71,6 +71,7 @@ def submit(
         require_place,
         write_archive,
     )
+    from semidense.pipeline.results.text import counted
 
     layout = layout_of(benchmark)
     forms = forms_of(layout, form)
@@ -87,7 +88,8 @@ def submit(
         return console.print_json({**row, "files": written.files, "mean_seconds": written.seconds})
     if lacks:
         console.print_notes([f"{benchmark}: the server takes no archive {lacks}"])
-    typer.echo(f"wrote {output}: {len(scenes)} scenes, {written.files} files, {written.seconds:.3g} s a scene")
+    holds = f"{counted(len(scenes), 'scene')}, {counted(written.files, 'file')}"
+    typer.echo(f"wrote {output}: {holds}, {written.seconds:.3g} s a scene")
     return None
 
 

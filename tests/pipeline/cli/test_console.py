@@ -83,13 +83,13 @@ def test_a_plan_is_a_line_a_step_and_a_sum(capsys: pytest.CaptureFixture[str]) -
     assert lines[1] == ["ramp", "Toy", "hit", KEY[:12]]
     assert lines[2] == ["ramp", "Toy", "stale", KEY[:12], "params.window:", "31", "->", "15"]
     assert lines[3][:3] == ["sum", "Toy", "missing"]
-    assert out.splitlines()[-2:] == ["reuses 1 products, makes 1 ramp, 1 sum", "time: about 3 min"]
+    assert out.splitlines()[-2:] == ["reuses 1 product, makes 1 ramp, 1 sum", "time: about 3 min"]
     assert err.splitlines() == ["note: one", "note: two"]
 
 
 def test_where_all_is_there_nothing_is_made(capsys: pytest.CaptureFixture[str]) -> None:
     console.print_plan(Plan((HIT,), ()), Estimate(170))
-    assert capsys.readouterr().out.splitlines()[-1] == "reuses 1 products, makes nothing"
+    assert capsys.readouterr().out.splitlines()[-1] == "reuses 1 product, makes nothing"
 
 
 def test_names_are_text_not_markup(capsys: pytest.CaptureFixture[str]) -> None:

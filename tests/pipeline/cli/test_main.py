@@ -218,7 +218,7 @@ def test_cache_verify_finds_a_flipped_byte(invoke: Invoke, own_cache: Path) -> N
 
 def test_cache_size_sums_up(invoke: Invoke, trained: Result) -> None:
     found = only_object(invoke("cache", "size", "--cache", trained.store.root, "--json").out)
-    assert set(found) == {"cache", "products", "quarantine", "drafts", "orphans", "total"}
+    assert set(found) == {"cache", "products", "quarantine", "drafts", "orphans", "bookkeeping", "total"}
     assert set(found["products"]) == PATH
     assert "costvolume" in invoke("cache", "size", "--cache", trained.store.root).out
 

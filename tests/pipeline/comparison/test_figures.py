@@ -43,6 +43,9 @@ def test_a_method_that_lacks_a_scene_has_dots_and_no_bar() -> None:
     assert [bar.get_width() for bar in axes.patches] == pytest.approx([0.3, 0])
     assert [list(line.get_xdata()) for line in axes.lines[:2]] == [[0.2, 0.4], [0.3]]
     assert list(axes.lines[2].get_xdata()) == pytest.approx([0.15, 0.15])
+    assert axes.lines[2].get_label() == "mean area of a perfect order"
+    lone = dots_figure(rows[:1], "auc", title="Areas").axes[0]
+    assert lone.lines[0].get_label() == "area of a perfect order"
 
 
 def test_the_perfect_order_is_drawn_though_the_first_method_lacks_a_scene() -> None:
@@ -53,7 +56,7 @@ def test_the_perfect_order_is_drawn_though_the_first_method_lacks_a_scene() -> N
 
 def test_no_curve_is_drawn_where_no_pixel_counts() -> None:
     axes = density_figure(mean_rows([row("density", "a", "other", pixels=0)])).axes[0]
-    assert axes.get_xlabel() == "invalid: nonocc pixels without a disparity (%), mean of 1 scenes"
+    assert axes.get_xlabel() == "invalid: nonocc pixels without a disparity (%), mean of 1 scene"
 
 
 def test_the_bars_name_their_mask_and_threshold() -> None:

@@ -6,7 +6,7 @@ import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semidense.pipeline.figures.cost_volume import draw_costs, expit, local_minima
+from semidense.pipeline.figures.cost_volume import draw_costs, draw_curve, expit, local_minima
 from semidense.pipeline.figures.drawing import new_figure
 from tests.pipeline.products import costvolume
 
@@ -40,6 +40,16 @@ def test_the_first_minimum_is_what_the_winner_takes(costs: list[float]) -> None:
 def test_expit_survives_the_ends_of_float16() -> None:
     assert [expit(-65504.0), expit(65504.0)] == [0.0, 1.0]
     assert expit(2.0) == pytest.approx(1 / (1 + np.exp(-2)))
+
+
+@pytest.mark.parametrize(
+    ("log_odds", "text"),
+    [(-65504.0, "0"), (-5.4, "0.0045"), (0.0, "0.5"), (0.2, "0.55"), (5.4, "0.9955"), (20.0, "1 - 2.1e-09")],
+)
+def test_a_probability_near_1_is_not_called_1(log_odds: float, text: str) -> None:
+    axes = new_figure("any").subplots()
+    draw_curve(axes, np.arange(2), np.array([log_odds, log_odds + 1]))
+    assert f"probability {text}" in [line.get_label().rsplit(", ", 1)[-1] for line in axes.lines]
 
 
 def test_the_pixel_is_valid_even_if_the_centre_is_not() -> None:

@@ -20,7 +20,7 @@ from semidense.pipeline.plan.environment import former_version
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.plan.plan import close_ranges
 from semidense.pipeline.plan.steps import Graph, Step
-from semidense.pipeline.results.text import bytes_text, print_table, results
+from semidense.pipeline.results.text import bytes_text, counted, print_table, results
 
 _UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0, "w": 7 * 86400.0}
 _BYTES = {"B": 1, "kB": 10**3, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
@@ -148,13 +148,12 @@ def _print_summary(found: Survey, deleted: tuple[Item, ...], yes: bool) -> None:
     console = results()
     items = deleted if yes else found.items
     size = bytes_text(sum(item.size for item in items))
-    kept = f"keeps {found.kept} entries, {bytes_text(found.kept_bytes)}"
+    kept = f"keeps {counted(found.kept, 'entry', 'entries')}, {bytes_text(found.kept_bytes)}"
     used = f", {found.used} of them only since a running process uses them" if found.used else ""
     if not found.items:
         console.print(f"nothing to delete; {kept}{used}")
     elif yes:
-        console.print(f"deleted {len(items)} things, {size}; {kept}{used}")
+        console.print(f"deleted {counted(len(items), 'thing')}, {size}; {kept}{used}")
     else:
-        console.print(
-            f"would delete {len(items)} things, {size}; {kept}{used}\nnothing was deleted: add --yes for that"
-        )
+        console.print(f"would delete {counted(len(items), 'thing')}, {size}; {kept}{used}")
+        console.print("nothing was deleted: add --yes for that")

@@ -16,7 +16,7 @@ from semidense.pipeline.api import open_store
 from semidense.pipeline.cli.console import print_json
 from semidense.pipeline.plan.errors import UsageError
 from semidense.pipeline.results.settings import Settings
-from semidense.pipeline.results.text import bytes_text, print_table, results
+from semidense.pipeline.results.text import bytes_text, counted, print_table, results
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,14 @@ def _only(entries: Iterable[Entry], start: str) -> Entry:
 
 
 def list_entries(folder: str | None, selection: Selection, as_json: bool) -> None:
-    """Print a line an entry, oldest first, with the settings that it belongs to."""
+    """Print a line an entry, oldest first, with the settings that it belongs to.
+
+    Raises:
+        UsageError: if a part of the cache is asked for, and there is nothing in it.
+    """
     store = open_store(folder)
-    entries, settings, used = selection.of(store), Settings(store.entries()), store.last_used()
+    entries = selection.of(store) if selection.is_all else selection.require(store)
+    settings, used = Settings(store.entries()), store.last_used()
     if as_json:
         names = ("key", "digest", "created", "seconds")
         rows = [
@@ -96,7 +101,7 @@ def list_entries(folder: str | None, selection: Selection, as_json: bool) -> Non
         table.add_row(*label, bytes_text(entry.size), *times, short(entry.key), escape(_cut(settings.text(entry))))
     console = results()
     print_table(table, console, ("settings", "last used", "dataset", "made in", "age"))
-    console.print(f"{len(entries)} entries, {bytes_text(sum(entry.size for entry in entries))}")
+    console.print(f"{counted(len(entries), 'entry', 'entries')}, {bytes_text(sum(entry.size for entry in entries))}")
 
 
 def _cut(text: str) -> str:
@@ -137,7 +142,8 @@ def print_sizes(folder: str | None, as_json: bool) -> None:
     """Print how much space each product takes, and everything together."""
     store = open_store(folder)
     sizes = size(store)
-    parts = {"quarantine": sizes.quarantine, "drafts": sizes.drafts, "orphans": sizes.orphans, "total": sizes.total}
+    names = ("quarantine", "drafts", "orphans", "bookkeeping", "total")
+    parts = {name: getattr(sizes, name) for name in names}
     if as_json:
         print_json({"cache": str(store.root), "products": dict(sizes.stages), **parts})
         return
@@ -150,7 +156,7 @@ def _sizes_table(products: Mapping[str, int], parts: Mapping[str, int]) -> Table
     table = Table("product", "size", box=None)
     table.columns[1].justify = "right"
     for name, count in [*sorted(products.items(), key=lambda item: -item[1]), *parts.items()]:
-        table.add_row(name, bytes_text(count))
+        table.add_row("records and sources" if name == "bookkeeping" else name, bytes_text(count))
     return table
 
 

@@ -7,7 +7,7 @@ from semidense.pipeline.api import open_store
 from semidense.pipeline.cli.commands.cache.listing import Selection
 from semidense.pipeline.cli.console import print_json
 from semidense.pipeline.results.provenance import Provenance, ancestry, tree_lines
-from semidense.pipeline.results.text import bytes_text, results
+from semidense.pipeline.results.text import bytes_text, counted, results
 
 
 def export_archive(folder: str | None, selection: Selection, target: Path, *, inputs: bool, as_json: bool) -> None:
@@ -29,7 +29,9 @@ def export_archive(folder: str | None, selection: Selection, target: Path, *, in
     if as_json:
         print_json({"archive": str(target), "entries": [entry.key for entry in entries], "bytes": size})
     else:
-        results().print(f"wrote {len(entries)} entries, {bytes_text(size)}, to {target}", markup=False)
+        results().print(
+            f"wrote {counted(len(entries), 'entry', 'entries')}, {bytes_text(size)}, to {target}", markup=False
+        )
 
 
 def import_archive(folder: str | None, source: Path, as_json: bool) -> None:
@@ -47,7 +49,7 @@ def import_archive(folder: str | None, source: Path, as_json: bool) -> None:
         print_json({"archive": str(source), "entries": rows})
     else:
         told = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
-        results().print(f"{len(rows)} entries checked: {told or 'it holds none'}", markup=False)
+        results().print(f"{counted(len(rows), 'entry', 'entries')} checked: {told or 'it holds none'}", markup=False)
 
 
 def trace(folder: str | None, key: str, graph: Path | None, as_json: bool) -> None:

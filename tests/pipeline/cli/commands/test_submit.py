@@ -54,12 +54,14 @@ def test_a_name_or_a_place_that_will_not_do_is_refused_before_anything_is_comput
 
 def test_a_partial_archive_holds_maps_and_times(invoke: Invoke, evaluation: Path) -> None:
     archive = evaluation / "new" / "a.zip"
-    ran = invoke(
+    words = (
         *("submit", "middlebury", f"middlebury:{evaluation}", "-o", archive, "--partial", "--method", "Mine"),
-        *("--mode", "fast", "--cache", evaluation / "cache", "--json"),
+        *("--mode", "fast", "--cache", evaluation / "cache"),
     )
+    ran = invoke(*words, "--json")
     assert ran.code == 0
     row = json.loads(ran.out)
+    assert "1 scene, 3 files" in invoke(*words).out
     assert (row["scenes"], row["files"], row["mean_seconds"] > 0) == (1, 3, True)
     with zipfile.ZipFile(archive) as found:
         found.extractall(evaluation / "out")

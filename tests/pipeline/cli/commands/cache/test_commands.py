@@ -37,6 +37,7 @@ def test_entries_are_listed_and_chosen(invoke: Invoke, filled: Store) -> None:
     ("arguments", "words"),
     [
         (["ls", "nothing"], ["'nothing'", "0 entries"]),
+        (["ls", "--product", "none"], ["no entry", "is selected"]),
         (["verify", "--product", "none"], ["no entry", "is selected"]),
         (["trace", "x"], ["'x'", "0 entries"]),
         (["gc", "--unused-for", "often"], ["--unused-for 'often'", "30d"]),
@@ -61,6 +62,19 @@ def test_a_mistake_is_one_line(invoke: Invoke, filled: Store, arguments: list[st
 def test_a_part_is_verified(invoke: Invoke, filled: Store) -> None:
     ran = invoke("cache", "verify", "--product", "sum", "--scene", "Toy", "--cache", filled.root)
     assert ran.out == "2 sound, 0 damaged, 0 in quarantine\n"
+
+
+def test_the_sizes_of_a_cache_add_up(invoke: Invoke, filled: Store) -> None:
+    found = json.loads(invoke("cache", "size", "--cache", filled.root, "--json").out)
+    rest = ("quarantine", "drafts", "orphans", "bookkeeping")
+    assert sum(found["products"].values()) + sum(found[name] for name in rest) == found["total"]
+    assert found["bookkeeping"] > 0
+    assert "records and sources" in invoke("cache", "size", "--cache", filled.root).out
+
+
+def test_one_thing_is_no_things(invoke: Invoke, filled: Store) -> None:
+    key = next(entry.key for entry in filled.entries() if entry.label["product"] == "ramp")
+    assert invoke("cache", "ls", key, "--cache", filled.root).out.splitlines()[-1].startswith("1 entry, ")
 
 
 def test_cleaning_shows_first_and_deletes_when_told(invoke: Invoke, filled: Store) -> None:
