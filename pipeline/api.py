@@ -277,7 +277,7 @@ def sweep_request(task: Task, R: Thresholds, over: Swept) -> Request:
     by_R = task.configuration().of("semidense", SemidenseParams).by_R
     request = task.request("metrics", variants_of(R, over, by_R))
     if not any(scene.has_truth for scene in request.dataset.scenes):
-        raise UsageError(f"{request.dataset.spec}: no scene has a ground truth, and a sweep judges maps by it")
+        raise UsageError(f"{request.dataset.spec}: no scene asked for has a ground truth to judge maps by")
     return request
 
 

@@ -62,7 +62,7 @@ def test_thresholds_are_tried_only_where_they_decide() -> None:
 
 
 def test_a_sweep_without_a_ground_truth_is_refused(make_pair: MakePair, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="pair: no scene has a ground truth, and a sweep judges maps by it"):
+    with pytest.raises(UsageError, match="pair: no scene asked for has a ground truth to judge maps by"):
         sweep_request(Task(make_pair(tmp_path / "pair")), 0.5, ())
 
 
