@@ -161,7 +161,7 @@ class _Exporter:
         self._write(self.folder / CONFIG, (json.dumps(document, indent=2) + "\n").encode())
 
     def _described(self, step_id: str, variant: str) -> dict[str, Any]:
-        """Return all sections of a result's configuration; settings and keys of it and of what it was made from."""
+        """Return a result's configuration as it was asked for; settings and keys of it and of what it was made from."""
         target = self.result.made[step_id].step
         steps = {step.product: step for step in reversed(lineage(self.result.made, step_id))}
         return {
@@ -169,7 +169,7 @@ class _Exporter:
             "scene": target.scene,
             "folder": self.scenes[target.scene],
             "variant": variant,
-            "sections": target.configuration,
+            "sections": target.asked,
             "settings": {product: step.settings for product, step in steps.items()},
             "keys": {product: self.result.made[step.id].key for product, step in steps.items()},
         }

@@ -255,7 +255,7 @@ def summary(match: Match) -> dict[str, Any]:
         "seconds": {each.step.product: each.seconds for each in steps},
         "reused": [each.step.product for each in steps if each.reused],
         "preset": match.result.preset,
-        "configuration": [{"sections": dict(match.made("semidense").step.configuration)}],
+        "configuration": [{"sections": dict(match.made("semidense").step.asked)}],
         "settings": {each.step.product: dict(each.step.settings) for each in steps},
         "keys": {each.step.product: each.key for each in steps},
     } | provenance(sys.argv)

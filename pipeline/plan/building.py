@@ -123,8 +123,7 @@ class _Builder:
                 f"training.held_out judges {len(judged)} of {asked} training scenes: those that the confidence "
                 "learns from (training.maps says how many of each data set)"
             )
-        for scene in judged:
-            yield self._not_having_seen(scene).product(product, scene)
+        yield from (self._not_having_seen(scene).product(product, scene) for scene in judged)
 
     def _add_product(self, product: str, scene: SceneSource | None) -> str:
         if scene and (source := source_of(product, scene)):
@@ -235,6 +234,11 @@ class _Builder:
     def _settings(self) -> dict[str, Any]:
         return self.config.to_dict()
 
+    def _configuration(self, product: str, argument: object) -> dict[str, Any]:
+        """Return all settings, a step's own as they were resolved for it."""
+        own = argument.model_dump(mode="json") if isinstance(argument, Params) else {}
+        return {name: own or known if name == product else known for name, known in self._settings.items()}
+
     def _add(
         self,
         stage: Stage,
@@ -262,7 +266,8 @@ class _Builder:
                 code=code_of(stage.module, *modules),
                 environment=environment(stage),
                 R=semidense.R if filtered else None,
-                configuration=self._settings,
+                configuration=self._configuration(stage.product, argument),
+                asked=self._settings,
             )
         return step_id
 

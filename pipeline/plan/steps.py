@@ -55,7 +55,8 @@ class Step:
         code: hash of every module that decides the result.
         environment: what else changes its bits.
         R: the confidence threshold that a product below ``semidense`` was made with.
-        configuration: all settings of the first variant that needs it, as they were asked for.
+        configuration: all settings of the first variant that needs it, with its own as they were resolved.
+        asked: the same as they were asked for, without what was found for a scene.
     """
 
     id: str
@@ -70,6 +71,7 @@ class Step:
     environment: Mapping[str, str]
     R: float | None = None
     configuration: Mapping[str, Any] = field(default_factory=dict)
+    asked: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return product and scene."""

@@ -68,14 +68,15 @@ def below(product: str) -> frozenset[str]:
 
 def _settings(tally: Tally) -> None:
     """Change each field of each section to another valid value."""
-    base = Config.load()
+    light = [f"{name}.relight=0" for name, net in Config.load() if hasattr(net, "relight")]  # a raw gray has no other
+    base = Config.load(None, light)
     before = keys_of(build(_request(base, train=True)))
     for section in type(base).model_fields:
         params = getattr(base, section)
         for name, field in type(params).model_fields.items():
             for value in _others(field, getattr(params, name)):
                 try:
-                    config = Config.load(None, [f"{section}.{name}={value}"])
+                    config = Config.load(None, [*light, f"{section}.{name}={value}"])
                     after = keys_of(build(_request(config, train=True)))
                 except ValueError:
                     continue

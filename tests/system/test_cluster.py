@@ -101,7 +101,7 @@ def test_a_worker_that_is_killed_in_a_batch_costs_the_scene_that_it_was_at(
 @pytest.mark.parametrize(
     ("function", "kind", "message"),
     [
-        ("fail_below", StageFailed, r"blurred of Toy, rows \d-\d: the fourth row broke it"),
+        ("fail_below", StageFailed, r"blurred of Toy, rows \d-\d: RuntimeError: the fourth row broke it"),
         ("refuse", StageRefused, r"blurred of Toy, rows \d-\d: these values are no good"),
     ],
 )

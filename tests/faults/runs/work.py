@@ -55,7 +55,8 @@ class Toys:
     def run(self, store: Store, scheduler: str | None = None) -> dict[str, str]:
         """See ``Work``."""
         graph = slow.scenes(self.scenes)
-        made = attempt(lambda: world.plan(store, graph), store, Unwatched(), {}, scheduler, 16)[1]
+        workers = None if scheduler else 16
+        made = attempt(lambda: world.plan(store, graph), store, Unwatched(), {}, scheduler, workers)[1]
         return {each.key: each.digest for each in made.values()}
 
 
