@@ -78,7 +78,7 @@ OutputOption = Annotated[
     typer.Option(
         "--output",
         "-o",
-        help="Write maps, metrics and configuration to this folder, in place of those of an earlier run.",
+        help="Write maps, metrics and configuration to this folder; maps of other scenes stay.",
     ),
 ]
 SchedulerOption = Annotated[

@@ -48,8 +48,9 @@ CONFIG = "config.json"
 _SWEEP = "sweep.json"
 """The record of a sweep."""
 _MAPS = ("disparity", "confidence", "semidense")
-_EXPORTED = re.compile(r"metrics\.csv|[^/.][^/]*(\.safetensors|/(disparity|confidence)[^/]*(\.pfm|-colour\.png))")
-"""Names of files that an export writes beside its record: no record makes it delete others."""
+_METRICS = "metrics.csv"
+_MAP = re.compile(r"([^/.][^/]*)/(disparity|confidence)[^/]*(\.pfm|-colour\.png)")
+"""Names of maps and their pictures, and the folder of their scene: no record makes an export delete others."""
 _LAST = 50
 """Training steps that the final loss is a mean of."""
 _Span = tuple[float, float]
@@ -57,7 +58,7 @@ _Span = tuple[float, float]
 
 def require_run_place(folder: Path, upto: str) -> None:
     """Refuse a folder for the results of a run up to a product before it is made; see ``publishing.require_place``."""
-    require_place(folder, CONFIG, {CONFIG, *(["metrics.csv"] if upto == "metrics" else [])})
+    require_place(folder, CONFIG, {CONFIG, *([_METRICS] if upto == "metrics" else [])})
 
 
 def require_sweep_place(folder: Path) -> None:
@@ -68,7 +69,8 @@ def require_sweep_place(folder: Path) -> None:
 def export(result: Result, folder: Path) -> list[Path]:
     """Write the results of a run into a folder, all of them or nothing; those of an earlier export are replaced.
 
-    Files of an earlier export that this one does not write are deleted: ``config.json`` is true of all that is there.
+    Of the scenes of this export no older file stays, nor do older figures. Maps of other scenes and networks stay, and
+    ``config.json`` says of each scene how its maps were made.
 
     Args:
         result: of a run or a sweep. Scenes that were only trained on are left out.
@@ -84,14 +86,30 @@ def export(result: Result, folder: Path) -> list[Path]:
         CacheError: if a result is no longer in the cache.
     """
     folder = Path(folder)
-    earlier = {name for name in written_before(folder, CONFIG) if _EXPORTED.fullmatch(name)}
-    with publishing(folder, CONFIG, _read_files(result), earlier) as draft:
+    before, ours = written_before(folder, CONFIG), {*_folders(result).values()}
+    obsolete = {name for name in before if name == _METRICS or ((map_ := _MAP.fullmatch(name)) and map_[1] in ours)}
+    with publishing(folder, CONFIG, _read_files(result), obsolete) as draft:
         exporter = _Exporter(result, draft)
         exporter.write_networks()
         exporter.write_maps()
         exporter.write_metrics()
-        exporter.write_config()
+        kept = sorted(name for name in before - obsolete if (folder / name).is_file())
+        exporter.write_config(kept, [each for each in _described_before(folder) if each.get("folder") not in ours])
     return [folder / path.relative_to(draft) for path in exporter.written]
+
+
+def _folders(result: Result) -> dict[str, str]:
+    """Return the folder of each scene that was asked for."""
+    return safe_names(result.made[step_id].step.scene for step_id, _ in result.plan.targets)
+
+
+def _described_before(folder: Path) -> list[dict[str, Any]]:
+    """Return what the record of an earlier export says of its results; nothing without a record."""
+    try:
+        found = json.loads((folder / CONFIG).read_text())["configuration"]
+        return [each for each in found if isinstance(each, dict)]
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return []
 
 
 def _read_files(result: Result) -> list[Path]:
@@ -111,7 +129,7 @@ class _Exporter:
     def __post_init__(self) -> None:
         """Find what there is, and name the scenes' folders."""
         self.found = wanted(self.result, (*_MAPS, *_learnt()))
-        self.scenes = safe_names(self.result.made[step_id].step.scene for step_id, _ in self.result.plan.targets)
+        self.scenes = _folders(self.result)
 
     def write_networks(self) -> None:
         """Write the trained networks and their calibration; shipped ones are files already."""
@@ -148,14 +166,19 @@ class _Exporter:
     def write_metrics(self) -> None:
         """Write the rows of the figures, if the run went so far."""
         if self.result.metrics:
-            path = self.folder / "metrics.csv"
+            path = self.folder / _METRICS
             write_rows(self.result.metrics, path)
             self.written.append(path)
 
-    def write_config(self) -> None:
-        """Write the command, the versions, the settings that each result was made with, and the names of the files."""
-        targets = [self._described(*target) for target in self.result.plan.targets]
-        files = {path.relative_to(self.folder).as_posix() for path in self.written} | {CONFIG}
+    def write_config(self, kept: Sequence[str], described: Sequence[dict[str, Any]]) -> None:
+        """Write the command, the versions, the settings that each result was made with, and the names of the files.
+
+        Args:
+            kept: files of earlier exports that stay.
+            described: what the earlier record says of scenes that are not of this export.
+        """
+        targets = [*described, *(self._described(*target) for target in self.result.plan.targets)]
+        files = {path.relative_to(self.folder).as_posix() for path in self.written} | {CONFIG, *kept}
         settings = {"preset": self.result.preset, "configuration": targets}
         document = provenance(sys.argv) | settings | {"files": sorted(files)}
         self._write(self.folder / CONFIG, (json.dumps(document, indent=2) + "\n").encode())

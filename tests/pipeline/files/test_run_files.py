@@ -323,22 +323,28 @@ def test_files_are_replaced_and_nothing_is_left_beside_them(run: Run, tmp_path: 
     assert len([path for path in out.rglob("*") if path.is_file()]) == 7
 
 
-def test_what_an_earlier_run_wrote_and_this_one_does_not_is_deleted(run: Run, tmp_path: Path) -> None:
+def test_of_the_scenes_of_a_run_no_older_file_stays_and_others_keep_theirs(run: Run, tmp_path: Path) -> None:
     nets, out = run.nets(), tmp_path / "out"
     for scene in ("Teddy", "Cones"):
         run.target(run.scene(scene, *nets), 0.5)
     run.rows.append(row())
     export(run.result(), out)
+    (out / "Teddy" / "disparity.pfm").rename(out / "Teddy" / "disparity-R0.50.pfm")  # as of a sweep
     (out / "Cones" / "notes.txt").write_text("mine")
-    (out / "Teddy" / "disparity.pfm").unlink()  # somebody tidied up
+    (out / "evaluation_net.safetensors").write_text("trained for hours")
+    record = json.loads((out / "config.json").read_text())
+    record["files"] += ["Teddy/disparity-R0.50.pfm", "evaluation_net.safetensors"]
+    (out / "config.json").write_text(json.dumps(record))
+    cones = names(sorted((out / "Cones").iterdir()), out)
     run.rows.clear()
     run.targets.clear()
-    run.target(run.scene("Pipes", *nets), 0.5)
-    written = export(run.result(), out)
-    there = {path for path in out.rglob("*") if path.is_file()}
-    assert there == {*written, out / "Cones" / "notes.txt"}
-    assert not (out / "Teddy").exists()
-    assert set(json.loads((out / "config.json").read_text())["files"]) == set(names(written, out))
+    run.target(run.scene("Teddy", *nets), 0.5)
+    written = names(export(run.result(), out), out)
+    there = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    assert there == {*written, *cones, "evaluation_net.safetensors"}
+    record = json.loads((out / "config.json").read_text())
+    assert {*record["files"]} == there - {"Cones/notes.txt"}
+    assert [each["scene"] for each in record["configuration"]] == ["Cones", "Teddy"]
 
 
 @pytest.mark.parametrize("name", ["../confidence.pfm", "thesis.pfm", "a/../../disparity.pfm"])
