@@ -231,7 +231,7 @@ class Stage:
         return self.compute.partition(":")[0]
 
     @property
-    def foreign_identity(self) -> dict[str, Any]:
+    def plugin_identity(self) -> dict[str, Any]:
         """What else the key of a stage of another package holds: its function, since a module may have several; arrays.
 
         A module of ours has one function a stage, and its arrays change with its code.

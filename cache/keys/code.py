@@ -127,8 +127,10 @@ def require_imported_as_hashed(modules: Iterable[str]) -> None:
             continue
         located = _locate(name)
         if located and located.file:
-            known, changed = _read(located), stamp_of(located.file) != _read(located).stamp
-            if changed and (name in _settled or source_hash(located.file.read_bytes()) != known.hash):
+            known = _read(located)
+            if stamp_of(located.file) != known.stamp and (
+                name in _settled or source_hash(located.file.read_bytes()) != known.hash
+            ):
                 raise EditedSource(_edited(located.file))
         _settled[name] = spec
 

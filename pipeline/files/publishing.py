@@ -50,7 +50,8 @@ def _publish(draft: Path, folder: Path, record: str, inputs: Collection[Path], o
     names = {path.relative_to(draft).as_posix() for path in draft.rglob("*") if path.is_file()}
     refuse_foreign(folder, record, names, inputs)
     earlier = written_before(folder, record)
-    _write_record(folder / record, {"files": sorted(earlier | names), "unfinished": True})
+    begun = read_record(folder, record) | {"files": sorted(earlier | names), "unfinished": True}
+    _write_record(folder / record, begun)
     for name in sorted(names - {record}):
         (folder / name).parent.mkdir(exist_ok=True)
         (draft / name).replace(folder / name)
@@ -94,12 +95,20 @@ def require_place(folder: Path, record: str, names: Iterable[str]) -> None:
     refuse_foreign(folder, record, names)
 
 
+def read_record(folder: Path, record: str) -> dict[str, Any]:
+    """Return what the record of an earlier command holds; nothing without a record."""
+    try:
+        found = json.loads((folder / record).read_text())
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
 def written_before(folder: Path, record: str) -> set[str]:
     """Return the names in the record of an earlier command, and the record's own; nothing without a record."""
     try:
-        listed = json.loads((folder / record).read_text())["files"]
-        return {_relative(each, folder) for each in listed} | {record}
-    except (OSError, ValueError, LookupError, TypeError, RecursionError, AttributeError):
+        return {_relative(each, folder) for each in read_record(folder, record)["files"]} | {record}
+    except (ValueError, LookupError, TypeError, AttributeError):
         return set()
 
 

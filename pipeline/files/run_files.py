@@ -31,7 +31,7 @@ from semidense.datasets.formats.pfm import write_pfm
 from semidense.pipeline.execution.tasks import provenance
 from semidense.pipeline.figures.colours import confidence_rgb, disparity_rgb, disparity_span
 from semidense.pipeline.files.file_names import safe_names
-from semidense.pipeline.files.publishing import publishing, require_place, written_before
+from semidense.pipeline.files.publishing import publishing, read_record, require_place, written_before
 from semidense.pipeline.files.selection import Wanted, wanted
 from semidense.pipeline.files.writing import explaining, save_png, table_text, write_rgb
 from semidense.pipeline.plan.plan import Made
@@ -105,11 +105,8 @@ def _folders(result: Result) -> dict[str, str]:
 
 def _described_before(folder: Path) -> list[dict[str, Any]]:
     """Return what the record of an earlier export says of its results; nothing without a record."""
-    try:
-        found = json.loads((folder / CONFIG).read_text())["configuration"]
-        return [each for each in found if isinstance(each, dict)]
-    except (OSError, ValueError, LookupError, TypeError, RecursionError):
-        return []
+    found = read_record(folder, CONFIG).get("configuration")
+    return [each for each in found if isinstance(each, dict)] if isinstance(found, list) else []
 
 
 def _read_files(result: Result) -> list[Path]:

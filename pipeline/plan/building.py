@@ -227,7 +227,7 @@ class _Builder:
     def _add_stage(
         self, stage: Stage, params: Params, scene: SceneSource | None, inputs: Mapping[str, tuple[str, ...]]
     ) -> str:
-        settings = params.model_dump(mode="json") | {"tiles": stage.tiling(params)} | stage.foreign_identity
+        settings = params.model_dump(mode="json") | {"tiles": stage.tiling(params)} | stage.plugin_identity
         return self._add(stage, scene, params, settings, inputs)
 
     @cached_property

@@ -295,6 +295,15 @@ def test_what_runs_is_what_was_hashed(tmp_path: Path, acts: str, refused: int) -
         assert line.endswith("restart Python (the kernel)")
 
 
+def test_a_clock_that_was_set_back_is_told(tmp_path: Path) -> None:
+    (tmp_path / "edited").mkdir()
+    (tmp_path / "edited" / "stage.py").write_text("x = 1\n")
+    back = EDITING.replace("def edit():", "now = time.time\ntime.time = lambda: now() - 1e6\n\ndef edit():")
+    done = subprocess.run([sys.executable, "-c", back, str(tmp_path), "import hash"], capture_output=True, text=True)
+    assert (done.stdout.splitlines()[-1], done.stderr) == ("end", "")
+    assert "stage.py was changed in the future: the clock was set back" in done.stdout
+
+
 def test_threads_hash_at_the_same_time() -> None:
     """Python 3.11 fails if one thread makes a syntax tree while another is interrupted in making one."""
     text = Path(ast.__file__).read_text()

@@ -73,10 +73,13 @@ def test_files_of_a_command_that_was_cut_short_can_be_replaced(tmp_path: Path, m
             raise KeyboardInterrupt
         return replace(self, target)
 
+    (tmp_path / RECORD).write_text(json.dumps({"files": [], "configuration": ["of another scene"]}))
     with monkeypatch.context() as patch:
         patch.setattr(Path, "replace", killed)
         with pytest.raises(KeyboardInterrupt):
             publish(tmp_path, "a", "b")
-    assert json.loads((tmp_path / RECORD).read_text())["unfinished"]
+    record = json.loads((tmp_path / RECORD).read_text())
+    assert record["unfinished"]
+    assert record["configuration"] == ["of another scene"], "what it said of files that stay is not lost"
     publish(tmp_path, "a", "b")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", RECORD]
